@@ -1,0 +1,27 @@
+#pragma once
+
+#include "core/reach.h"
+
+namespace ivis {
+
+/// Slack of every containment test between a client's pose and the cell its PVS was solved for.
+/// Occluders are shrunk by the reach grown by these, so that a pose this far outside is still served.
+/// A flat disc stands on streets that are not: its vertical slack is larger.
+inline constexpr double kReachToleranceM = 0.001;
+inline constexpr double kDiscVerticalToleranceM = 0.01;
+inline double vertical_tolerance(const Reach& r) {
+  return r.kind() == Reach::Kind::kDisc ? kDiscVerticalToleranceM : kReachToleranceM;
+}
+
+/// Every viewpoint that one visibility solution must serve: eye + reach.
+struct ViewCell {
+  Vec3 eye{0};
+  Reach reach;
+
+  /// With the slack above.
+  bool contains(const Vec3& p) const {
+    return reach.contains(p - eye, kReachToleranceM, vertical_tolerance(reach));
+  }
+};
+
+}  // namespace ivis

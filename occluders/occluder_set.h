@@ -1,0 +1,75 @@
+#pragma once
+// The value that travels from occluders/ to visibility/: shrunk solids. Light: no builder, no CGAL.
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "core/aabb.h"
+#include "core/ids.h"
+#include "core/math.h"
+#include "core/reach.h"
+
+namespace ivis {
+
+/// Region of the ground plane in (x, z): closed rings without repeated end point, even-odd filled. The
+/// interior is on the left of outer rings when x points right and z *up* the page (positive shoelace
+/// area), on the left of holes too (negative area).
+struct Polygon {
+  std::vector<std::vector<Vec2>> rings;
+  bool empty() const { return rings.empty(); }
+};
+
+double area(const Polygon& polygon);  ///< square metres, holes subtracted
+bool contains(const Polygon& polygon, const Vec2& p);  ///< even-odd; on the border either answer
+
+/// footprint x [bottom, top].
+struct Prism {
+  Polygon footprint;
+  double bottom = 0;  ///< metres; of a shrunk prism: raised by the vertical reach
+  double top = 0;
+  /// Of a shrunk prism: the lowest y of the solid it came from (before any raising).
+  double solid_bottom = 0;
+  /// Drawn, opaque, closed ground covers the footprint at or above `solid_bottom`, and the footprint
+  /// lies within OccluderSet::ground: the prism reaches down without end for cells over that ground.
+  bool grounded = false;
+
+  Aabb bounds() const;
+};
+
+/// Where observers may be. Kept for the record: what counted as solid depends on it.
+struct ViewSpace {
+  enum class Kind : std::uint8_t { kOutside, kInside };
+  Kind kind = Kind::kOutside;  ///< outside every solid
+  std::vector<Vec3> seeds;     ///< points known to be in it (--inside, --path)
+};
+
+/// Occluders of one scene shrunk for one reach.
+/// Guarantee: each shrunk prism, extended down where its rule allows, lies inside the erosion
+///            E(O, W) of the union O of the scene's opaque solids (and what closed ground covers), where
+///            W is the hull of 0 and V' - apex, V' = reach.grown(slack_m + tolerance, ...). So a solution computed from the
+///            apex (the highest point of the cell) is right for the whole cell (docs/theory.md, 4).
+/// Threads: a value.
+struct OccluderSet {
+  SceneHash scene_hash = 0;
+  Reach reach;               ///< the largest reach a cell may have
+  double slack_m = 0.001;    ///< further shrinking that pays for floating-point positions
+  ViewSpace view_space;
+  std::vector<Prism> shrunk;
+  std::vector<Prism> solids;  ///< unshrunk: to know whether an eye is inside one
+  /// Rectangle of the ground plane (lo.x..hi.x, lo.z..hi.z; y ignored) that one continuous opaque height
+  /// field covers; empty when there is none.
+  Aabb ground;
+  /// Lowest y of anything listed or blocking. A prism whose solid_bottom is not above it reaches down
+  /// without end for cells that lie nowhere below solid_bottom: no sight line passes under it.
+  double floor = 0;
+};
+
+/// May the shrunk prism be taken as reaching down without end, for every viewpoint of a cell that
+/// spans `cell` (bounding box of eye + reach)? docs/theory.md, section 4, "downward extension".
+bool extends_down(const OccluderSet& set, const Prism& prism, const Aabb& cell);
+
+/// Is p inside one of the unshrunk solids? Cost: linear in solids; visibility/ has an index.
+bool inside_solid(const OccluderSet& set, const Vec3& p);
+
+}  // namespace ivis

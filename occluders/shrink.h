@@ -1,0 +1,50 @@
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "core/context.h"
+#include "core/result.h"
+#include "occluders/occluder_set.h"
+#include "scenes/scene.h"
+
+namespace ivis {
+
+/// Erodes one polygon of the ground plane by the shadow of a reach: {x : x + V_xz in P}.
+/// The result errs inwards. Implementations: fast_erosion.h (no GPL), exact/exact_erosion.h (CGAL).
+class Eroder {
+ public:
+  virtual ~Eroder() = default;
+  virtual const char* name() const = 0;
+  /// Guarantee: the result lies inside the true erosion. Errors: none; what fails comes back empty.
+  /// Threads: const and reentrant.
+  virtual std::vector<Polygon> erode(const Polygon& polygon, const Reach& reach) const = 0;
+};
+
+struct ShrinkReport {
+  std::size_t occluders_in = 0;   ///< objects considered
+  std::size_t occluders_out = 0;  ///< shrunk prisms
+  std::map<std::string, std::size_t> left_out;  ///< reason -> objects (or pieces)
+  double solid_volume = 0;   ///< cubic metres, real solids, without extensions
+  double kept_volume = 0;    ///< of the shrunk prisms, without extensions
+  double seconds = 0;
+  double volume_kept() const { return solid_volume > 0 ? kept_volume / solid_volume : 0; }
+};
+
+struct ShrinkOptions {
+  Reach reach;
+  ViewSpace view_space;
+};
+
+struct Shrunk {
+  OccluderSet set;
+  ShrinkReport report;
+};
+
+/// Scene -> solids (prisms.h) -> fused per height level (fuse.h) -> eroded -> gated by an independent
+/// distance check. Errors: kInvalidArgument when a seed of the view space lies in a solid; kCancelled.
+/// Threads: reentrant; uses context.threads; the result does not depend on their number.
+Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Eroder& eroder,
+                      const Context& context = {});
+
+}  // namespace ivis

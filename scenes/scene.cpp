@@ -1,0 +1,163 @@
+#include "scenes/scene.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <numeric>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+namespace ivis {
+namespace {
+
+bool finite(const Mat4& m) {
+  for (int c = 0; c < 4; ++c)
+    for (int r = 0; r < 4; ++r)
+      if (!std::isfinite(m[c][r])) return false;
+  return true;
+}
+
+std::string describe(const Scene& scene, const Object& o) {
+  std::string name = o.node < scene.node_names.size() ? scene.name_of(o) : std::string();
+  return "node " + std::to_string(o.node) + (name.empty() ? "" : " '" + name + "'");
+}
+
+Status check_mesh(const Mesh& mesh, std::size_t index) {
+  const std::string where = "mesh " + std::to_string(index);
+  if (mesh.indices.size() % 3 != 0)
+    return input_error(where + ": " + std::to_string(mesh.indices.size()) + " indices, expected a multiple of 3");
+  for (const std::uint32_t i : mesh.indices)
+    if (i >= mesh.positions.size())
+      return input_error(where + ": index " + std::to_string(i) + ", expected below " +
+                         std::to_string(mesh.positions.size()));
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const auto& p = mesh.positions[i];
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+      return input_error(where + ": position " + std::to_string(i) + " is not finite");
+  }
+  std::size_t next = 0;
+  for (const Primitive& p : mesh.primitives) {
+    if (p.first_triangle != next) return input_error(where + ": primitives do not cover its triangles in order");
+    next += p.triangles;
+  }
+  if (next != mesh.triangles()) return input_error(where + ": primitives do not cover its triangles");
+  return ok();
+}
+
+/// World box of the object's triangles, grown by what rounding of the transform may have lost.
+Aabb world_bounds(const Scene& scene, const Object& o) {
+  const Mesh& mesh = scene.mesh_of(o);
+  Aabb box;
+  for (const std::uint32_t i : mesh.indices)
+    box.add(Vec3(o.to_world * glm::dvec4(Vec3(mesh.positions[i]), 1.0)));
+  if (box.empty()) {
+    const Vec3 origin(o.to_world[3]);
+    return {origin, origin};
+  }
+  const Vec3 magnitude = glm::max(glm::abs(box.lo), glm::abs(box.hi));
+  const double rounding = 1e-12 * std::max({magnitude.x, magnitude.y, magnitude.z, 1.0});
+  return {box.lo - rounding, box.hi + rounding};
+}
+
+class Hasher {
+ public:
+  Hasher() { XXH3_64bits_reset(&state_); }
+  template <class T>
+  void add(const T& value) {
+    static_assert(std::is_arithmetic_v<T>);
+    XXH3_64bits_update(&state_, &value, sizeof value);
+  }
+  template <class T>
+  void add(const std::vector<T>& values) {
+    add(std::uint64_t{values.size()});
+    XXH3_64bits_update(&state_, values.data(), values.size() * sizeof(T));
+  }
+  void add(const Object& o) {
+    add(o.node);
+    add(o.instance);
+    add(o.mesh);
+    add(static_cast<std::uint8_t>(o.tag));
+    add(static_cast<std::uint8_t>(o.always_visible));
+    for (int c = 0; c < 4; ++c)
+      for (int r = 0; r < 4; ++r) add(o.to_world[c][r]);
+  }
+  std::uint64_t digest() const { return XXH3_64bits_digest(&state_); }
+
+ private:
+  XXH3_state_t state_{};
+};
+
+/// The low 10 bits of v, two zero bits between each.
+std::uint32_t spread3(std::uint32_t v) {
+  v &= 0x3ffU;
+  v = (v | (v << 16U)) & 0x030000ffU;
+  v = (v | (v << 8U)) & 0x0300f00fU;
+  v = (v | (v << 4U)) & 0x030c30c3U;
+  v = (v | (v << 2U)) & 0x09249249U;
+  return v;
+}
+
+}  // namespace
+
+Status finish_scene(Scene& scene) {
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m)
+    if (auto s = check_mesh(scene.meshes[m], m); !s) return s;
+  scene.bounds = {};
+  scene.triangle_count = 0;
+  for (auto* list : {&scene.objects, &scene.hidden_solids}) {
+    for (Object& o : *list) {
+      if (o.mesh >= scene.meshes.size())
+        return input_error(describe(scene, o) + ": mesh " + std::to_string(o.mesh) + ", expected below " +
+                           std::to_string(scene.meshes.size()));
+      if (o.node >= scene.node_names.size()) scene.node_names.resize(std::size_t{o.node} + 1);
+      if (!finite(o.to_world)) return input_error(describe(scene, o) + ": its transform is not finite");
+      o.bounds = world_bounds(scene, o);
+      if (!std::isfinite(o.bounds.lo.x + o.bounds.lo.y + o.bounds.lo.z + o.bounds.hi.x + o.bounds.hi.y + o.bounds.hi.z))
+        return input_error(describe(scene, o) + ": its world bounds are not finite");
+      scene.bounds.add(o.bounds);
+    }
+  }
+  for (const Object& o : scene.objects) scene.triangle_count += scene.mesh_of(o).triangles();
+
+  Hasher hasher;
+  for (const Mesh& m : scene.meshes) {
+    hasher.add(m.positions);
+    hasher.add(m.indices);
+    for (const Primitive& p : m.primitives) {
+      hasher.add(p.first_triangle);
+      hasher.add(p.triangles);
+      hasher.add(static_cast<std::uint8_t>(p.opaque));
+      hasher.add(static_cast<std::uint8_t>(p.double_sided));
+    }
+  }
+  for (const auto* list : {&scene.objects, &scene.hidden_solids}) {
+    hasher.add(std::uint64_t{list->size()});
+    for (const Object& o : *list) hasher.add(o);
+  }
+  hasher.add(static_cast<std::uint8_t>(scene.honour_sidedness));
+  scene.hash = hasher.digest();
+  return ok();
+}
+
+std::vector<ObjectId> rank_order(const Scene& scene) {
+  Aabb centres;
+  for (const Object& o : scene.objects) centres.add(o.bounds.centre());
+  const Vec3 size = centres.size();
+  const double extent = std::max({size.x, size.y, size.z, 1e-9});
+  std::vector<std::uint32_t> code(scene.objects.size());
+  for (std::size_t i = 0; i < code.size(); ++i) {
+    const Vec3 p = (scene.objects[i].bounds.centre() - centres.lo) / extent * 1023.0;
+    code[i] = spread3(static_cast<std::uint32_t>(p.x)) | (spread3(static_cast<std::uint32_t>(p.z)) << 1U) |
+              (spread3(static_cast<std::uint32_t>(p.y)) << 2U);
+  }
+  std::vector<ObjectId> order(scene.objects.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::sort(order.begin(), order.end(), [&](ObjectId a, ObjectId b) {
+    return code[a] != code[b] ? code[a] < code[b] : a < b;
+  });
+  return order;
+}
+
+}  // namespace ivis

@@ -1,0 +1,92 @@
+#pragma once
+// The messages of wire/SPEC.md as values. Envelope: FlatBuffers (wire/ivis.fbs), verified before use.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/ids.h"
+#include "core/math.h"
+#include "core/reach.h"
+#include "core/result.h"
+
+namespace ivis::wire {
+
+inline constexpr std::uint16_t kProtocolVersion = 1;
+
+/// Client -> server, first.
+struct Hello {
+  std::uint16_t version = kProtocolVersion;
+  /// The client's scene, 0: it has none and takes the server's.
+  SceneHash scene_hash = 0;
+  /// The reach the client wants; empty text: the server's own.
+  std::string reach;
+  /// Send the table that maps ranks to ids, nodes and instances.
+  bool want_table = true;
+};
+
+/// rank -> (id, node, instance), structure of arrays, zstd-compressed inside the message.
+struct ObjectTable {
+  std::vector<ObjectId> id;
+  std::vector<std::uint32_t> node;
+  std::vector<std::uint32_t> instance;
+};
+
+/// Server -> client, the answer to Hello.
+struct Welcome {
+  std::uint16_t version = kProtocolVersion;
+  std::uint64_t session = 0;      ///< named in every later message; a restarted server does not know it
+  SceneHash scene_hash = 0;
+  std::uint64_t order_hash = 0;   ///< of the rank order, so that two ends with different orders say so
+  std::uint32_t objects = 0;
+  std::string reach;              ///< what every PVS of this session is valid for
+  std::string method;
+  ObjectTable table;              ///< empty unless wanted
+};
+
+/// Client -> server; the latest wins, none is answered twice.
+struct PoseMessage {
+  std::uint64_t session = 0;
+  std::uint32_t sequence = 0;   ///< rises by one a pose
+  std::uint32_t have_pvs = 0;   ///< sequence of the last PVS decoded, 0: none; acknowledges it as a base
+  Vec3 eye{0};
+};
+
+/// Server -> client, pushed.
+struct PvsMessage {
+  std::uint64_t session = 0;
+  std::uint32_t sequence = 0;   ///< of the pose it answers
+  std::uint32_t base = 0;       ///< sequence of the PVS it is a difference to, 0: a full set
+  Vec3 eye{0};                  ///< centre of the cell it is valid for
+  bool everything = false;      ///< all objects are listed, as nothing better can be said; payload empty
+  std::uint32_t solve_us = 0;   ///< visibility time at the server, for latency accounts
+  std::vector<std::byte> payload;  ///< wire/pvs_codec.h
+};
+
+enum class Refusal : std::uint8_t { kVersion = 1, kScene = 2, kReach = 3, kSession = 4, kMalformed = 5, kBusy = 6, kClosing = 7 };
+
+/// Server -> client; the session named (0: none) is over unless the refusal is kBusy.
+struct Refused {
+  std::uint64_t session = 0;
+  Refusal reason = Refusal::kMalformed;
+  std::string text;
+};
+
+/// Client -> server: the session is over.
+struct Bye {
+  std::uint64_t session = 0;
+};
+
+using Message = std::variant<Hello, Welcome, PoseMessage, PvsMessage, Refused, Bye>;
+
+std::vector<std::byte> encode(const Message& message);
+
+/// Errors: kInput naming what is wrong. Bounds: at most kMaxMessageBytes, every count is checked against
+/// the bytes left (and the table's decompressed size against `objects`) before anything is allocated.
+inline constexpr std::size_t kMaxMessageBytes = 64U << 20U;
+Result<Message> decode(std::span<const std::byte> bytes);
+
+}  // namespace ivis::wire

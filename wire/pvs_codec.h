@@ -1,0 +1,45 @@
+#pragma once
+// PVS <-> bytes. No sockets, no ids: objects are named by rank (scenes/scene.h, rank_order).
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/ids.h"
+#include "core/result.h"
+
+namespace ivis::wire {
+
+/// A set of ranks 0..size-1, one bit each; bits past `size` are zero.
+struct RankSet {
+  std::uint32_t size = 0;
+  std::vector<std::uint64_t> words;
+
+  explicit RankSet(std::uint32_t n = 0) : size(n), words((std::size_t{n} + 63) / 64) {}
+  bool test(Rank r) const { return ((words[r >> 6U] >> (r & 63U)) & 1U) != 0; }
+  void set(Rank r) { words[r >> 6U] |= std::uint64_t{1} << (r & 63U); }
+  std::size_t count() const;
+  bool operator==(const RankSet&) const = default;
+};
+
+/// What both ends remember of one PVS to code the next against it: the set, and the adaptive
+/// probabilities as they stood after it. A default-made base of the right size stands for "nothing
+/// known": the coded set is then a full one.
+struct PvsState {
+  RankSet set;
+  // + the coder's adaptive model: a fixed-size value, documented in SPEC.md
+
+  explicit PvsState(std::uint32_t objects = 0);
+};
+
+/// Codes `set` as its difference to `base` and moves the model on: `after` is what the decoder will
+/// hold. Requires set.size == base.set.size. Cost: see bench/pvs_codec_bench.cpp.
+std::vector<std::byte> encode_pvs(const RankSet& set, const PvsState& base, PvsState& after);
+
+/// Errors: kInput for bytes that are not such a difference (truncated, trailing, out of range): never
+/// reads outside `bytes`, time and memory are bounded by base.set.size and bytes.size().
+Result<PvsState> decode_pvs(std::span<const std::byte> bytes, const PvsState& base);
+
+}  // namespace ivis::wire
