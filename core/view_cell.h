@@ -13,6 +13,12 @@ inline double vertical_tolerance(const Reach& r) {
   return r.kind() == Reach::Kind::kDisc ? kDiscVerticalToleranceM : kReachToleranceM;
 }
 
+/// What occluders are shrunk by, so that one solution serves every pose that ViewCell::contains()
+/// accepts and `slack_m` of floating-point error in positions besides.
+inline Reach padded(const Reach& r, double slack_m) {
+  return r.grown(kReachToleranceM + slack_m, vertical_tolerance(r) + slack_m);
+}
+
 /// Every viewpoint that one visibility solution must serve: eye + reach.
 struct ViewCell {
   Vec3 eye{0};
