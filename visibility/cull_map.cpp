@@ -1,0 +1,308 @@
+#include "visibility/cull_map.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+
+namespace ivis {
+namespace {
+
+constexpr double kSquareM = 4;  ///< of the orthographic map
+
+/// Boxes are subtracted from the eye in single precision: how far the rounded eye may be from the true one.
+/// The occluders' slack pays for it (core/view_cell.h, padded).
+bool eye_fits_single_precision(const Vec3& eye, double slack_m) {
+  for (int i = 0; i < 3; ++i)
+    if (std::abs(eye[i] - static_cast<double>(static_cast<float>(eye[i]))) > 0.5 * slack_m) return false;
+  return true;
+}
+
+WallSet make_walls(const OccluderSet& occluders, const Vec3& origin) {
+  WallSet walls;
+  std::vector<Aabb> boxes;
+  std::vector<std::uint32_t> items;
+  for (const Prism& prism : occluders.shrunk) {
+    WallSet::Solid solid;
+    solid.first_ring = static_cast<std::uint32_t>(walls.rings.size());
+    for (const auto& ring : prism.footprint.rings) {
+      if (ring.size() < 3) continue;
+      walls.rings.push_back({static_cast<std::uint32_t>(walls.x.size()), static_cast<std::uint32_t>(ring.size())});
+      ++solid.rings;
+      for (const Vec2& p : ring) {
+        walls.x.push_back(static_cast<float>(p.x - origin.x));
+        walls.z.push_back(static_cast<float>(p.y - origin.z));
+      }
+    }
+    if (solid.rings == 0) continue;
+    solid.top = static_cast<float>(prism.top - origin.y);
+    solid.bottom = static_cast<float>(prism.bottom - origin.y);
+    solid.floored = prism.solid_bottom <= occluders.floor;
+    solid.grounded = prism.grounded;
+    boxes.push_back(prism.bounds());
+    items.push_back(static_cast<std::uint32_t>(walls.solids.size()));
+    walls.solids.push_back(solid);
+  }
+  walls.x.resize(walls.x.size() + BoxTree::kWidth);
+  walls.z.resize(walls.z.size() + BoxTree::kWidth);
+  walls.tree = BoxTree::build(boxes, items, origin);
+  return walls;
+}
+
+}  // namespace
+
+/// The cell as the maps want it.
+struct CullMap::Eye {
+  Vec3 apex;        ///< relative to origin_
+  float single[3];  ///< the same, rounded
+  Floors floors;
+};
+
+struct CullMap::Scratch {
+  explicit Scratch(std::uint32_t bins_a_face) : polar(bins_a_face) {}
+  PolarMap polar;
+  OrthographicMap::Heights heights;
+  std::vector<std::uint32_t> visible;
+  std::vector<std::uint64_t> bits;
+};
+
+CullMap::CullMap(const Scene& scene, const OccluderSet& occluders, const MethodOptions& options, const PolarGuards& guards,
+                 std::uint32_t bins_a_face)
+    : scene_(scene),
+      occluders_(occluders),
+      options_(options),
+      guards_(guards),
+      bins_a_face_(bins_a_face),
+      origin_(scene.bounds.empty() ? Vec3{0} : scene.bounds.centre()),
+      walls_(make_walls(occluders, origin_)),
+      solids_(occluders) {
+  std::vector<Aabb> boxes;
+  std::vector<std::uint32_t> ids;
+  for (ObjectId id = 0; id < scene.objects.size(); ++id) {
+    const Object& o = scene.objects[id];
+    if (o.always_visible) {
+      always_visible_.push_back(id);
+    } else {
+      boxes.push_back(o.bounds);
+      ids.push_back(id);
+    }
+  }
+  objects_ = BoxTree::build(boxes, ids, origin_);
+  for (const WallSet::Solid& s : walls_.solids) {
+    all_floored_ = all_floored_ && s.floored;
+    all_grounded_ = all_grounded_ && s.grounded;
+    all_held_down_ = all_held_down_ && (s.floored || s.grounded);
+  }
+  if (options.map == CullMapKind::kOrthographic) {
+    Aabb bounds{scene.bounds.lo - origin_, scene.bounds.hi - origin_};
+    if (scene.bounds.empty()) bounds = {};
+    orthographic_ = std::make_unique<OrthographicMap>(bounds, kSquareM);
+  }
+}
+
+CullMap::~CullMap() = default;
+
+MethodTraits CullMap::make_traits() {
+  return {"cull-map", Guarantee::kConservative, true,
+          "shadows of shrunk prisms over a 2.5D scene (Wonka, Wimmer, Sillion 2001, section 5.1)"};
+}
+
+const MethodTraits& CullMap::traits() const {
+  static const MethodTraits traits = make_traits();
+  return traits;
+}
+
+std::unique_ptr<CullMap::Scratch> CullMap::take_scratch() const {
+  const std::lock_guard lock(scratch_mutex_);
+  if (scratch_.empty()) return std::make_unique<Scratch>(bins_a_face_);
+  auto scratch = std::move(scratch_.back());
+  scratch_.pop_back();
+  return scratch;
+}
+
+void CullMap::give_back(std::unique_ptr<Scratch> scratch) const {
+  const std::lock_guard lock(scratch_mutex_);
+  scratch_.push_back(std::move(scratch));
+}
+
+Result<Pvs> CullMap::solve(const ViewCell& cell) const {
+  Stats stats;
+  return solve(cell, stats);
+}
+
+Result<Pvs> CullMap::solve(const ViewCell& cell, Stats& stats) const {
+  if (!std::isfinite(cell.eye.x) || !std::isfinite(cell.eye.y) || !std::isfinite(cell.eye.z))
+    return invalid_argument("the eye is not finite");
+  if (!padded(occluders_.reach, occluders_.slack_m).contains(padded(cell.reach, occluders_.slack_m)))
+    return invalid_argument("reach " + cell.reach.to_string() + " is larger than the occluders were shrunk for, " +
+                            occluders_.reach.to_string());
+  Pvs pvs;
+  pvs.cell = cell;
+  pvs.scene_hash = scene_.hash;
+  const Vec3 half = padded(cell.reach, occluders_.slack_m).half_extents();
+  Eye eye;
+  eye.apex = cell.eye + Vec3{0, half.y, 0} - origin_;
+  for (int i = 0; i < 3; ++i) eye.single[i] = static_cast<float>(eye.apex[i]);
+  if (solids_.holds(cell.eye)) {
+    pvs.everything_because = "eye inside an occluder";
+  } else if (!eye_fits_single_precision(eye.apex, occluders_.slack_m)) {
+    pvs.everything_because = "eye too far from the scene for single precision";
+  }
+  if (!pvs.everything_because.empty()) {
+    pvs.objects.resize(scene_.objects.size());
+    std::iota(pvs.objects.begin(), pvs.objects.end(), 0U);
+    return pvs;
+  }
+  const Aabb box{cell.eye - half, cell.eye + half};
+  eye.floors.above_floor = box.lo.y >= occluders_.floor;
+  const Aabb& ground = occluders_.ground;
+  eye.floors.on_ground = !ground.empty() && box.lo.x >= ground.lo.x && box.hi.x <= ground.hi.x && box.lo.z >= ground.lo.z &&
+                         box.hi.z <= ground.hi.z;
+  const bool down = (eye.floors.above_floor && all_floored_) || (eye.floors.on_ground && all_grounded_) ||
+                    (eye.floors.above_floor && eye.floors.on_ground && all_held_down_);
+  eye.floors.undersides = !down;
+  stats.undersides = down ? 0 : 1;
+
+  auto scratch = take_scratch();
+  scratch->visible.clear();
+  if (orthographic_) {
+    find_orthographic(eye, *scratch);
+  } else {
+    find_polar(eye, *scratch, stats);
+  }
+  // Ascending ids by way of a bit set: cheaper than sorting, and the same for any number of threads.
+  auto& bits = scratch->bits;
+  bits.assign((scene_.objects.size() + 63) / 64, 0);
+  for (const std::uint32_t id : scratch->visible) bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
+  for (const ObjectId id : always_visible_) bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
+  pvs.objects.reserve(scratch->visible.size() + always_visible_.size());
+  for (std::size_t w = 0; w < bits.size(); ++w)
+    for (std::uint64_t m = bits[w]; m != 0; m &= m - 1)
+      pvs.objects.push_back(static_cast<ObjectId>(w * 64 + static_cast<std::size_t>(std::countr_zero(m))));
+  give_back(std::move(scratch));
+  return pvs;
+}
+
+/// The options_.max_occluders solids of largest projected area (width times height over distance squared), near ones first.
+std::vector<std::uint32_t> CullMap::largest_solids(const Eye& eye) const {
+  std::vector<std::uint32_t> chosen;
+  if (options_.max_occluders == 0 || options_.max_occluders >= walls_.solids.size()) return chosen;
+  struct Candidate {
+    double area;
+    double distance;
+    std::uint32_t solid;
+  };
+  std::vector<Candidate> all;
+  for (const BoxTree::Node& node : walls_.tree.nodes)
+    for (std::uint32_t c = 0; c < node.count; ++c) {
+      if ((node.child[c] & BoxTree::kItem) == 0) continue;
+      const auto at = [](float v) { return static_cast<double>(v); };
+      const double dx = std::max({at(node.lo_x[c]) - eye.apex.x, eye.apex.x - at(node.hi_x[c]), 0.0});
+      const double dz = std::max({at(node.lo_z[c]) - eye.apex.z, eye.apex.z - at(node.hi_z[c]), 0.0});
+      const double d = std::max(std::hypot(dx, dz), 0.1);
+      const double width = std::hypot(at(node.hi_x[c]) - at(node.lo_x[c]), at(node.hi_z[c]) - at(node.lo_z[c]));
+      all.push_back({width * (at(node.hi_y[c]) - at(node.lo_y[c])) / (d * d), d, node.child[c] & ~BoxTree::kItem});
+    }
+  const auto larger = [](const Candidate& a, const Candidate& b) { return a.area != b.area ? a.area > b.area : a.solid < b.solid; };
+  const auto nearer = [](const Candidate& a, const Candidate& b) { return a.distance != b.distance ? a.distance < b.distance : a.solid < b.solid; };
+  const auto end = all.begin() + static_cast<std::ptrdiff_t>(options_.max_occluders);
+  std::nth_element(all.begin(), end, all.end(), larger);
+  std::sort(all.begin(), end, nearer);
+  for (auto it = all.begin(); it != end; ++it) chosen.push_back(it->solid);
+  return chosen;
+}
+
+void CullMap::find_polar(const Eye& eye, Scratch& scratch, Stats& stats) const {
+  scratch.polar.clear();
+  draw_walls(walls_, eye.single, eye.floors, largest_solids(eye), guards_, scratch.polar, stats.polar);
+  scratch.polar.finish(eye.floors.undersides);
+  if (objects_.nodes.empty()) return;
+  if (options_.threads <= 1) {
+    find_visible(objects_, 0, eye.single, eye.floors.undersides, scratch.polar, scratch.visible, stats.polar);
+    return;
+  }
+  // The tree's upper levels alone, then each subtree as a task: the same tests as in one thread.
+  std::vector<std::uint32_t> roots{0};
+  while (!roots.empty() && roots.size() < 8U * options_.threads) {
+    std::vector<std::uint32_t> next;
+    for (const std::uint32_t r : roots)
+      find_visible_children(objects_, r, eye.single, eye.floors.undersides, scratch.polar, scratch.visible, next, stats.polar);
+    roots = std::move(next);
+  }
+  std::vector<std::vector<std::uint32_t>> found(roots.size());
+  std::vector<PolarStats> counts(roots.size());
+  tbb::task_arena arena(static_cast<int>(options_.threads));
+  arena.execute([&] {
+    tbb::parallel_for(std::size_t{0}, roots.size(), [&](std::size_t i) {
+      find_visible(objects_, roots[i], eye.single, eye.floors.undersides, scratch.polar, found[i], counts[i]);
+    });
+  });
+  for (std::size_t i = 0; i < roots.size(); ++i) {
+    scratch.visible.insert(scratch.visible.end(), found[i].begin(), found[i].end());
+    stats.polar.nodes_tested += counts[i].nodes_tested;
+  }
+}
+
+void CullMap::find_orthographic(const Eye& eye, Scratch& scratch) const {
+  const OrthographicMap& map = *orthographic_;
+  auto& heights = scratch.heights;
+  map.clear(heights);
+  const auto hidden = [&](const BoxTree::Node& node, std::uint32_t c, bool finished) {
+    const double top = static_cast<double>(node.hi_y[c]) - eye.apex.y;
+    return map.hides(heights, {static_cast<double>(node.lo_x[c]), static_cast<double>(node.lo_z[c])},
+                     {static_cast<double>(node.hi_x[c]), static_cast<double>(node.hi_z[c])},
+                     static_cast<float>(top + 1e-6 * std::abs(top)), finished);
+  };
+  // Solids near first, skipping what is in shadow already.
+  std::vector<std::uint32_t> order = largest_solids(eye);
+  if (order.empty()) {
+    struct Near {
+      double distance;
+      const BoxTree::Node* node;
+      std::uint32_t child;
+    };
+    std::vector<Near> all;
+    for (const BoxTree::Node& node : walls_.tree.nodes)
+      for (std::uint32_t c = 0; c < node.count; ++c) {
+        if ((node.child[c] & BoxTree::kItem) == 0) continue;
+        const double dx = std::max({static_cast<double>(node.lo_x[c]) - eye.apex.x, eye.apex.x - static_cast<double>(node.hi_x[c]), 0.0});
+        const double dz = std::max({static_cast<double>(node.lo_z[c]) - eye.apex.z, eye.apex.z - static_cast<double>(node.hi_z[c]), 0.0});
+        all.push_back({std::max(dx, dz), &node, c});
+      }
+    std::sort(all.begin(), all.end(), [](const Near& a, const Near& b) {
+      return a.distance != b.distance ? a.distance < b.distance : a.node->child[a.child] < b.node->child[b.child];
+    });
+    for (const Near& n : all)
+      if (!hidden(*n.node, n.child, false)) draw_orthographic(n.node->child[n.child] & ~BoxTree::kItem, eye, scratch);
+  } else {
+    for (const std::uint32_t s : order) draw_orthographic(s, eye, scratch);
+  }
+  map.finish(heights);
+  if (objects_.nodes.empty()) return;
+  std::vector<std::uint32_t> stack{0};
+  while (!stack.empty()) {
+    const BoxTree::Node& node = objects_.nodes[stack.back()];
+    stack.pop_back();
+    for (std::uint32_t c = 0; c < node.count; ++c) {
+      if (hidden(node, c, true)) continue;
+      if ((node.child[c] & BoxTree::kItem) != 0) {
+        scratch.visible.push_back(node.child[c] & ~BoxTree::kItem);
+      } else {
+        stack.push_back(node.child[c]);
+      }
+    }
+  }
+}
+
+void CullMap::draw_orthographic(std::uint32_t solid, const Eye& eye, Scratch& scratch) const {
+  const WallSet::Solid& s = walls_.solids[solid];
+  if ((s.floored && eye.floors.above_floor) || (s.grounded && eye.floors.on_ground))
+    orthographic_->draw(walls_, s, eye.apex, scratch.heights);
+}
+
+}  // namespace ivis

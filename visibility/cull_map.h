@@ -1,0 +1,70 @@
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "visibility/box_tree.h"
+#include "visibility/method.h"
+#include "visibility/orthographic_map.h"
+#include "visibility/polar_map.h"
+#include "visibility/solid_index.h"
+
+namespace ivis {
+
+/// The cull map: shrunk prisms throw shadows over a 2.5D scene; what lies in them is hidden.
+/// Guarantee: conservative: an object seen from anywhere in the cell is never left out.
+/// Errors:    kInvalidArgument if the cell's reach is larger than the occluders were shrunk for.
+/// Threads:   solve() is const and reentrant; the result does not depend on options.threads.
+/// Cost:      polar: O(visible hierarchy nodes + azimuth bins of the occluders met); bench/cull_map_bench.cpp.
+/// Source:    Wonka, Wimmer, Sillion, Instant Visibility, 2001, section 5.1.
+/// Departs:   polar map by default; real undersides of prisms; several layers an azimuth.
+class CullMap : public Method {
+ public:
+  /// What a solve did, for reports and tests.
+  struct Stats {
+    PolarStats polar;
+    std::uint32_t undersides = 0;
+  };
+
+  static constexpr std::uint32_t kBinsAFace = 1024;
+
+  CullMap(const Scene& scene, const OccluderSet& occluders, const MethodOptions& options,
+          const PolarGuards& guards = {}, std::uint32_t bins_a_face = kBinsAFace);
+  ~CullMap() override;
+  const MethodTraits& traits() const override;
+  Result<Pvs> solve(const ViewCell& cell) const override;
+  Result<Pvs> solve(const ViewCell& cell, Stats& stats) const;
+
+  static MethodTraits make_traits();
+
+ private:
+  struct Scratch;
+  struct Eye;
+
+  std::vector<std::uint32_t> largest_solids(const Eye& eye) const;
+  void find_polar(const Eye& eye, Scratch& scratch, Stats& stats) const;
+  void find_orthographic(const Eye& eye, Scratch& scratch) const;
+  void draw_orthographic(std::uint32_t solid, const Eye& eye, Scratch& scratch) const;
+  std::unique_ptr<Scratch> take_scratch() const;
+  void give_back(std::unique_ptr<Scratch> scratch) const;
+
+  const Scene& scene_;
+  const OccluderSet& occluders_;
+  MethodOptions options_;
+  PolarGuards guards_;
+  std::uint32_t bins_a_face_;
+  Vec3 origin_;
+  BoxTree objects_;
+  WallSet walls_;
+  bool all_floored_ = true;
+  bool all_grounded_ = true;
+  bool all_held_down_ = true;  ///< floored or grounded
+  std::vector<ObjectId> always_visible_;
+  SolidIndex solids_;
+  std::unique_ptr<OrthographicMap> orthographic_;
+  mutable std::mutex scratch_mutex_;
+  mutable std::vector<std::unique_ptr<Scratch>> scratch_;
+};
+
+}  // namespace ivis

@@ -1,0 +1,55 @@
+#include "visibility/method.h"
+
+#include "visibility/cull_map.h"
+
+namespace ivis {
+
+const char* to_string(Guarantee g) {
+  switch (g) {
+    case Guarantee::kConservative: return "conservative";
+    case Guarantee::kExactAtSamples: return "exact at samples";
+    case Guarantee::kAggressive: return "aggressive";
+  }
+  return "unknown";
+}
+
+namespace {
+
+struct Entry {
+  MethodTraits traits;
+  std::unique_ptr<Method> (*make)(const Scene&, const OccluderSet&, const MethodOptions&);
+};
+
+const std::vector<Entry>& entries() {
+  static const std::vector<Entry> all{
+      {CullMap::make_traits(),
+       [](const Scene& s, const OccluderSet& o, const MethodOptions& m) -> std::unique_ptr<Method> {
+         return std::make_unique<CullMap>(s, o, m);
+       }},
+  };
+  return all;
+}
+
+}  // namespace
+
+std::vector<MethodTraits> method_list() {
+  std::vector<MethodTraits> traits;
+  for (const Entry& e : entries()) traits.push_back(e.traits);
+  return traits;
+}
+
+Result<std::unique_ptr<Method>> make_method(std::string_view name, const Scene& scene, const OccluderSet& occluders,
+                                            const MethodOptions& options) {
+  std::string known;
+  for (const Entry& e : entries()) {
+    if (e.traits.name == name) {
+      if (e.traits.needs_occluders && occluders.scene_hash != scene.hash)
+        return mismatch("the occluders belong to another scene than the one loaded");
+      return e.make(scene, occluders, options);
+    }
+    known += (known.empty() ? "" : ", ") + e.traits.name;
+  }
+  return invalid_argument("no method '" + std::string(name) + "'; known: " + known);
+}
+
+}  // namespace ivis
