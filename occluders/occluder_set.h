@@ -60,7 +60,8 @@ struct OccluderSet {
   /// Rectangle of the ground plane (lo.x..hi.x, lo.z..hi.z; y ignored) that one continuous opaque height
   /// field covers; empty when there is none.
   Aabb ground;
-  /// Lowest y of anything listed or blocking. A prism whose solid_bottom is not above it reaches down
+  /// Lowest y of any triangle of an object or hidden solid, worked out as solid_bottom is (so that a base at the
+  /// floor compares equal; Object::bounds are grown by rounding). A prism whose solid_bottom is not above it reaches down
   /// without end for cells that lie nowhere below solid_bottom: no sight line passes under it.
   double floor = 0;
 };

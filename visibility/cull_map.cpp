@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-#include <tbb/blocked_range.h>
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -236,7 +236,7 @@ void CullMap::find_polar(const Eye& eye, Scratch& scratch, Stats& stats) const {
   }
   std::vector<std::vector<std::uint32_t>> found(roots.size());
   std::vector<PolarStats> counts(roots.size());
-  tbb::task_arena arena(static_cast<int>(options_.threads));
+  tbb::task_arena arena(std::min(static_cast<int>(options_.threads), tbb::info::default_concurrency()));
   arena.execute([&] {
     tbb::parallel_for(std::size_t{0}, roots.size(), [&](std::size_t i) {
       find_visible(objects_, roots[i], eye.single, eye.floors.undersides, scratch.polar, found[i], counts[i]);

@@ -49,7 +49,7 @@ TEST_P(CullMapOnBothMaps, AWallHidesWhatIsBehindAndBelowItsTopAndNothingElse) {
 TEST_P(CullMapOnBothMaps, AnOccluderLowerThanTheEyeHidesWhatLiesInItsShadowOnly) {
   const Reach reach = Reach::cylinder(0.5, 0.1);
   // Eye at 20, wall top at 10 from x = 10 to 20 (far end): the shadow leaves the far edge at slope about -1/2.
-  const auto s = test::make_prism_scene({{rectangle(10, -60, 20, 60), 0, 10}}, {small_box({22, 0.3, 0}), small_box({60, 0.3, 0})}, reach);
+  const auto s = test::make_prism_scene({{rectangle(10, -60, 20, 60), 0, 10}}, {small_box({26, 0.3, 0}), small_box({60, 0.3, 0})}, reach);
   const Pvs pvs = solve(s, {0, 20, 0}, reach);
   EXPECT_FALSE(lists(pvs, 1)) << "close behind the far edge";
   EXPECT_TRUE(lists(pvs, 2)) << "seen over the roof";
@@ -247,8 +247,10 @@ TEST(CullMapGuards, EachOneTakenOutIsCaughtByRays) {
 TEST(CullMapGuards, TheLeastOverABinSavesWhatStandsBeforeAWallSeenAtAGrazingAngle) {
   const Reach reach = Reach::disc(0.5);
   std::vector<Aabb> boxes;
-  for (int x = 20; x < 380; x += 3) boxes.push_back(small_box({x, 1.5, -1.5}));
-  const auto s = test::make_prism_scene({{rectangle(5, -12, 400, -2), 0, 20}}, boxes, reach);
+  // In front of the wall's line z = -3.114 + 0.0228 x, in the bin left of u = 0 where the wall recedes from 75 m to 158 m.
+  for (int x = 100; x < 130; x += 2) boxes.push_back(small_box({x, 1.5, (-3.114 + 0.0228 * x) / 2}, 0.05));
+
+  const auto s = test::make_prism_scene({{{{5, -23}, {400, -14}, {400, 6}, {5, -3}}, 0, 20}}, boxes, reach);
   for (const bool on : {true, false}) {
     PolarGuards guards;
     guards.least_over_bin = on;

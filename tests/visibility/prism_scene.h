@@ -52,7 +52,9 @@ inline PrismScene make_prism_scene(const std::vector<PrismScene::Solid>& solids,
   out.scene = std::move(builder).finish();
   out.occluders.scene_hash = out.scene.hash;
   out.occluders.reach = reach;
-  out.occluders.floor = out.scene.bounds.lo.y;
+  out.occluders.floor = std::numeric_limits<double>::infinity();
+  for (const auto& solid : solids) out.occluders.floor = std::min(out.occluders.floor, solid.bottom);
+  for (const Aabb& b : boxes) out.occluders.floor = std::min(out.occluders.floor, b.lo.y);
   const Reach margin = padded(reach, out.occluders.slack_m);
   for (const auto& s : solids) {
     Prism prism;
