@@ -1,0 +1,178 @@
+#include "tools/common.h"
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <ctime>
+#include <iostream>
+
+#include <unistd.h>
+
+#include "occluders/fast_erosion.h"
+#include "occluders/file.h"
+
+namespace ivis::tool {
+namespace {
+
+std::atomic<bool> interrupted{false};
+
+extern "C" void on_interrupt(int) {
+  if (interrupted.exchange(true)) _exit(kInterrupted);  // the second Ctrl-C does not wait
+}
+
+}  // namespace
+
+int exit_code(const Error& error) {
+  switch (error.code) {
+    case ErrorCode::kInvalidArgument: return kUsage;
+    case ErrorCode::kInput:
+    case ErrorCode::kIo:
+    case ErrorCode::kMismatch:
+    case ErrorCode::kUnsupported: return kBadInput;
+    case ErrorCode::kConnection: return kNoConnection;
+    case ErrorCode::kCancelled: return kInterrupted;
+  }
+  return kCheckFailed;
+}
+
+Context make_context(bool quiet) {
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
+  Context context;
+  context.stop = &interrupted;
+  if (quiet) return context;
+  context.log = [](std::string_view line) { std::cerr << line << '\n'; };
+  if (isatty(STDERR_FILENO) != 0) {
+    context.progress = [](std::string_view stage, std::size_t done, std::size_t total) {
+      constexpr std::size_t kWidth = 30;
+      const std::size_t filled = total == 0 ? kWidth : std::min(kWidth, done * kWidth / total);
+      std::cerr << '\r' << stage << " [" << std::string(filled, '#') << std::string(kWidth - filled, '.') << "] " << done << '/'
+                << total << "\x1b[K" << (done >= total ? "\n" : "") << std::flush;
+    };
+  }
+  return context;
+}
+
+void print(const Json& json) { std::cout << json.dump() << '\n'; }
+Json to_json(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
+
+Result<Vec3> parse_point(const std::string& text) {
+  Vec3 p{0};
+  const char* at = text.data();
+  const char* end = text.data() + text.size();
+  for (int i = 0; i < 3; ++i) {
+    const auto parsed = std::from_chars(at, end, p[i]);
+    const bool last = i == 2;
+    if (parsed.ec != std::errc{} || !std::isfinite(p[i]) || (last ? parsed.ptr != end : parsed.ptr == end || *parsed.ptr != ','))
+      return invalid_argument("'" + text + "' is not a point; expected X,Y,Z in metres, as in 10,1.7,-4.5");
+    at = parsed.ptr + (last ? 0 : 1);
+  }
+  return p;
+}
+
+void SceneArgs::add_to(CLI::App& app) {
+  app.add_option("SCENE", file, "glTF scene, .glb or .gltf")->required();
+  app.add_flag("--honour-sidedness", honour_sidedness, "single-sided triangles do not block from behind (default: all block from both sides)");
+}
+
+Result<Scene> SceneArgs::load(const Context& context) const {
+  SceneOptions options;
+  options.honour_sidedness = honour_sidedness;
+  auto scene = load_scene(file, options, context);
+  if (scene)
+    for (const std::string& w : scene->warnings) context.say("warning: " + w);
+  return scene;
+}
+
+void ViewSpaceArgs::add_to(CLI::App& app) {
+  auto* inside_option = app.add_option("--inside", inside, "a point X,Y,Z where observers are; may be given again")->type_name("X,Y,Z");
+  auto* path_option = app.add_option("--path", path, "CSV of poses (columns x,y,z) where observers are");
+  auto* outside_option = app.add_flag("--outside", outside, "observers are outside every solid (default)");
+  inside_option->excludes(path_option)->excludes(outside_option);
+  path_option->excludes(outside_option);
+}
+
+Result<ViewSpace> ViewSpaceArgs::read() const {
+  ViewSpace space;
+  if (!inside.empty()) {
+    space.kind = ViewSpace::Kind::kInside;
+    for (const std::string& text : inside) {
+      const auto p = parse_point(text);
+      if (!p) return p.error();
+      space.seeds.push_back(*p);
+    }
+  } else if (!path.empty()) {
+    space.kind = ViewSpace::Kind::kInside;
+    const auto poses = read_path(path);
+    if (!poses) return poses.error();
+    for (const Pose& pose : *poses) space.seeds.push_back(pose.eye);
+  }
+  return space;
+}
+
+void SolveArgs::add_to(CLI::App& app, bool reach_required) {
+  auto* option = app.add_option("--reach", reach,
+                                "how far the observer can get while an answer is in use: ball:r | disc:r | cylinder:r,h | "
+                                "ellipsoid:a,b,c | box:a,b,c (metres; h, a, b, c are half-extents)")
+                     ->type_name("R");
+  if (reach_required) option->required();
+  std::string methods;
+  for (const auto& t : method_list()) methods += (methods.empty() ? "" : "; ") + t.name + ": " + t.summary;
+  app.add_option("--method", method, methods)->capture_default_str()->type_name("M");
+  app.add_option("--map", map, "sampling of the cull map")->capture_default_str()->check(CLI::IsMember({"polar", "orthographic"}));
+  app.add_option("--occluders", occluders, "shrunk occluders, made by 'ivis shrink' (default: shrink now)")->type_name("F.ivo");
+  app.add_option("--threads", threads, "threads of one solve; the result does not depend on it")->capture_default_str()->check(CLI::Range(1, 256));
+  app.add_option("--max-occluders", max_occluders, "draw only the N occluders of largest projected area; 0: all that show")->capture_default_str();
+  app.add_option("--reference-rays", rays, "aimed rays an object of the method 'reference'")->capture_default_str()->check(CLI::Range(1, 1000000));
+}
+
+Result<Reach> SolveArgs::parse_reach() const { return Reach::parse(reach); }
+
+Result<OccluderSet> SolveArgs::get_occluders(const Scene& scene, const Reach& wanted, const Context& context) const {
+  if (occluders.empty()) {
+    ShrinkOptions options;
+    options.reach = wanted;
+    auto shrunk = shrink(scene, options, FastEroder{}, context);
+    if (!shrunk) return shrunk.error();
+    return std::move(shrunk->set);
+  }
+  auto set = read_occluders(occluders);
+  if (!set) return set.error();
+  if (auto s = check_occluders(*set, scene.hash, wanted, occluders.string()); !s) return s.error();
+  return std::move(*set);
+}
+
+Result<std::unique_ptr<Method>> SolveArgs::make(const Scene& scene, const OccluderSet& set) const {
+  MethodOptions options;
+  options.map = map == "polar" ? CullMapKind::kPolar : CullMapKind::kOrthographic;
+  options.threads = threads;
+  options.max_occluders = max_occluders;
+  options.rays = rays;
+  return make_method(method, scene, set, options);
+}
+
+double percentile(std::vector<double> values, double p) {
+  if (values.empty()) return 0;
+  const auto at = static_cast<std::size_t>(std::ceil(p * static_cast<double>(values.size()))) ;
+  const std::size_t k = std::min(values.size() - 1, at == 0 ? 0 : at - 1);
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
+  return values[k];
+}
+
+double median(std::vector<double> values) {
+  const double low = percentile(values, 0.5);
+  if (values.size() % 2 == 1 || values.empty()) return low;
+  std::sort(values.begin(), values.end());
+  return (low + values[values.size() / 2]) / 2;
+}
+
+double cpu_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_nsec) * 1e-9;
+}
+
+}  // namespace ivis::tool

@@ -1,0 +1,89 @@
+#pragma once
+// What the subcommands of `ivis` share: options, exit codes, progress, JSON.
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "core/context.h"
+#include "core/path.h"
+#include "core/reach.h"
+#include "core/result.h"
+#include "occluders/shrink.h"
+#include "scenes/load.h"
+#include "visibility/method.h"
+
+namespace ivis::tool {
+
+using Json = nlohmann::ordered_json;
+
+enum Exit { kOk = 0, kCheckFailed = 1, kUsage = 2, kBadInput = 3, kNoConnection = 4, kInterrupted = 130 };
+
+/// What a subcommand's action ends with: an exit code, or an error that is printed and mapped to one.
+using Outcome = Result<int>;
+
+int exit_code(const Error& error);
+
+/// Progress bar on a terminal's standard error, Ctrl-C as Context::stop, log lines to standard error.
+Context make_context(bool quiet);
+
+void print(const Json& json);
+Json to_json(const Vec3& v);
+
+/// "X,Y,Z" -> Vec3; CLI11 validator and converter.
+Result<Vec3> parse_point(const std::string& text);
+
+/// SCENE and how to read it.
+struct SceneArgs {
+  std::filesystem::path file;
+  bool honour_sidedness = false;
+  void add_to(CLI::App& app);
+  Result<Scene> load(const Context& context) const;
+};
+
+/// Where observers may be: --inside, --path, --outside.
+struct ViewSpaceArgs {
+  std::vector<std::string> inside;
+  std::filesystem::path path;
+  bool outside = false;
+  void add_to(CLI::App& app);
+  Result<ViewSpace> read() const;
+};
+
+/// --reach, --method, --map, --occluders, --threads ...: everything a solve needs.
+struct SolveArgs {
+  std::string reach;
+  std::string method = "cull-map";
+  std::string map = "polar";
+  std::filesystem::path occluders;
+  unsigned threads = 1;
+  std::size_t max_occluders = 0;
+  std::size_t rays = 256;
+  void add_to(CLI::App& app, bool reach_required);
+  Result<Reach> parse_reach() const;
+  /// The occluder file, or the scene shrunk here and now by the fast builder.
+  Result<OccluderSet> get_occluders(const Scene& scene, const Reach& reach, const Context& context) const;
+  Result<std::unique_ptr<Method>> make(const Scene& scene, const OccluderSet& set) const;
+};
+
+double median(std::vector<double> values);
+double percentile(std::vector<double> values, double p);
+
+/// CPU seconds of this process.
+double cpu_seconds();
+
+void add_info(CLI::App& app, std::function<Outcome()>& action);
+void add_objects(CLI::App& app, std::function<Outcome()>& action);
+void add_shrink(CLI::App& app, std::function<Outcome()>& action);
+void add_pvs(CLI::App& app, std::function<Outcome()>& action);
+void add_verify(CLI::App& app, std::function<Outcome()>& action);
+void add_draw(CLI::App& app, std::function<Outcome()>& action);
+void add_walk(CLI::App& app, std::function<Outcome()>& action);
+void add_generate(CLI::App& app, std::function<Outcome()>& action);
+
+}  // namespace ivis::tool

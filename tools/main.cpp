@@ -1,0 +1,45 @@
+#include <exception>
+#include <functional>
+#include <iostream>
+
+#include "tools/common.h"
+
+// The command `ivis`. Exit codes: 0, 1 a check failed, 2 usage, 3 input, 4 connection.
+int main(int argc, char** argv) {
+  using namespace ivis::tool;
+  CLI::App app{
+      "ivis: what can be seen from anywhere the observer can get to.\n\n"
+      "  ivis generate city -o city.glb --path-out walk.csv      a city to try things on\n"
+      "  ivis shrink city.glb --reach cylinder:1.5,0.1 -o city.ivo\n"
+      "  ivis pvs city.glb --eye 10,1.7,4 --reach cylinder:1.5,0.1 --occluders city.ivo\n"
+      "  ivis verify city.glb --path walk.csv --reach cylinder:1.5,0.1\n"
+      "  ivisd --scene city.glb --occluders city.ivo &\n"
+      "  ivis walk --connect tcp://127.0.0.1:7447 --path walk.csv\n\n"
+      "Exit codes: 0 done, 1 a check failed, 2 usage, 3 input, 4 connection.",
+      "ivis"};
+  app.set_version_flag("--version", IVIS_VERSION);
+  app.require_subcommand(1);
+  std::function<Outcome()> action;
+  add_info(app, action);
+  add_objects(app, action);
+  add_shrink(app, action);
+  add_pvs(app, action);
+  add_verify(app, action);
+  add_draw(app, action);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? kOk : kUsage;
+  }
+  try {
+    const Outcome outcome = action();
+    if (outcome) return *outcome;
+    std::cerr << "ivis: " << outcome.error().message << '\n';
+    return exit_code(outcome.error());
+  } catch (const std::bad_alloc&) {
+    std::cerr << "ivis: out of memory\n";
+  } catch (const std::exception& e) {
+    std::cerr << "ivis: " << e.what() << '\n';
+  }
+  return kBadInput;
+}

@@ -1,0 +1,69 @@
+#include "occluders/shrink.h"
+
+#include <iostream>
+#include <memory>
+
+#include "occluders/fast_erosion.h"
+#include "occluders/file.h"
+#include "tools/common.h"
+
+namespace ivis::tool {
+namespace {
+
+struct Args {
+  SceneArgs scene;
+  ViewSpaceArgs space;
+  std::string reach;
+  std::string builder = "fast";
+  std::filesystem::path out;
+  unsigned threads = 0;
+  bool json = false;
+};
+
+Outcome run(const Args& args) {
+  const auto reach = Reach::parse(args.reach);
+  if (!reach) return reach.error();
+  Context context = make_context(args.json);
+  context.threads = args.threads;
+  ShrinkOptions options;
+  options.reach = *reach;
+  const auto space = args.space.read();
+  if (!space) return space.error();
+  options.view_space = *space;
+  const auto scene = args.scene.load(context);
+  if (!scene) return scene.error();
+  const auto eroder = make_eroder(args.builder);
+  const auto shrunk = shrink(*scene, options, *eroder, context);
+  if (!shrunk) return shrunk.error();
+  if (auto s = write_occluders(args.out, shrunk->set); !s) return s.error();
+  const ShrinkReport& r = shrunk->report;
+  if (args.json) {
+    Json left_out = Json::object();
+    for (const auto& [reason, count] : r.left_out) left_out[reason] = count;
+    print({{"occluders_in", r.occluders_in}, {"occluders_out", r.occluders_out}, {"left_out", left_out},
+           {"volume_kept", r.volume_kept()}, {"seconds", r.seconds}});
+    return kOk;
+  }
+  std::cout << r.occluders_in << " objects -> " << r.occluders_out << " shrunk prisms in " << r.seconds << " s ("
+            << eroder->name() << " builder), " << 100 * r.volume_kept() << " % of the solids' volume kept\n";
+  for (const auto& [reason, count] : r.left_out) std::cout << "  left out: " << count << "  " << reason << '\n';
+  std::cout << "written: " << args.out.string() << '\n';
+  return kOk;
+}
+
+}  // namespace
+
+void add_shrink(CLI::App& app, std::function<Outcome()>& action) {
+  CLI::App* sub = app.add_subcommand("shrink", "shrink a scene's occluders by a reach and write them to a file");
+  auto args = std::make_shared<Args>();
+  args->scene.add_to(*sub);
+  args->space.add_to(*sub);
+  sub->add_option("--reach", args->reach, "ball:r | disc:r | cylinder:r,h | ellipsoid:a,b,c | box:a,b,c, metres")->required()->type_name("R");
+  sub->add_option("-o,--output", args->out, "occluder file to write")->required()->type_name("F.ivo");
+  sub->add_option("--builder", args->builder, "fast: edge capsules; exact: CGAL Minkowski sums, slow")->capture_default_str()->check(CLI::IsMember({"fast", "exact"}));
+  sub->add_option("--threads", args->threads, "0: as many as the machine has")->capture_default_str();
+  sub->add_flag("--json", args->json, "print JSON");
+  sub->callback([&action, args] { action = [args] { return run(*args); }; });
+}
+
+}  // namespace ivis::tool

@@ -1,0 +1,106 @@
+#include "visibility/verify.h"
+
+#include <iostream>
+#include <memory>
+
+#include "tools/common.h"
+
+namespace ivis::tool {
+namespace {
+
+struct Args {
+  SceneArgs scene;
+  SolveArgs solve;
+  std::filesystem::path path;
+  std::filesystem::path record;
+  std::size_t rays = 64;
+  std::size_t stride = 1;
+  std::uint64_t seed = 1;
+  bool json = false;
+};
+
+/// Sums up the reports of all cells.
+class Summary {
+ public:
+  void add(const CellReport& r) {
+    rays_ += r.rays;
+    false_negatives_ += r.false_negatives;
+    for (const Miss& m : r.missing)
+      if (missing_.size() < 20) missing_.push_back(m);
+    pvs_.push_back(static_cast<double>(r.pvs));
+    seen_.push_back(static_cast<double>(r.seen));
+    if (r.seen > 0) ratio_.push_back(static_cast<double>(r.pvs) / static_cast<double>(r.seen));
+  }
+  int report(bool json) const {
+    if (json) {
+      Json missing = Json::array();
+      for (const Miss& m : missing_) missing.push_back({{"id", m.id}, {"eye", to_json(m.eye)}, {"hit", to_json(m.hit)}});
+      print({{"rays", rays_}, {"false_negatives", false_negatives_}, {"missing", missing}, {"pvs_median", median(pvs_)},
+             {"seen_median", median(seen_)}, {"overestimate", median(ratio_)}});
+    } else {
+      std::cout << pvs_.size() << " cells, " << rays_ << " rays at culled objects: " << false_negatives_ << " objects missed; median PVS "
+                << median(pvs_) << ", seen by rays " << median(seen_) << ", ratio " << median(ratio_) << '\n';
+      for (const Miss& m : missing_)
+        std::cout << "  missed: object " << m.id << " from " << to_json(m.eye).dump() << " at " << to_json(m.hit).dump() << '\n';
+    }
+    return false_negatives_ > 0 ? kCheckFailed : kOk;
+  }
+
+ private:
+  std::size_t rays_ = 0;
+  std::size_t false_negatives_ = 0;
+  std::vector<Miss> missing_;
+  std::vector<double> pvs_, seen_, ratio_;
+};
+
+Outcome run(const Args& args) {
+  const Context context = make_context(args.json);
+  Context quiet = context;
+  quiet.progress = nullptr;
+  VerifyOptions options;
+  options.rays_per_culled_object = args.rays;
+  options.seed = args.seed;
+  const auto reach = args.solve.parse_reach();
+  if (!reach) return reach.error();
+  const auto path = read_path(args.path);
+  if (!path) return path.error();
+  const auto scene = args.scene.load(context);
+  if (!scene) return scene.error();
+  const auto occluders = args.solve.get_occluders(*scene, *reach, context);
+  if (!occluders) return occluders.error();
+  const auto method = args.solve.make(*scene, *occluders);
+  if (!method) return method.error();
+  const Verifier verifier(*scene, &*occluders);
+  Summary summary;
+  for (std::size_t row = 0; row < path->size(); row += args.stride) {
+    const auto pvs = (*method)->solve({(*path)[row].eye, *reach});
+    if (!pvs) return pvs.error();
+    const auto report = verifier.check(*pvs, options, quiet);
+    if (!report) return report.error();
+    summary.add(*report);
+    context.report("verify", std::min(row + args.stride, path->size()), path->size());
+  }
+  return summary.report(args.json);
+}
+
+}  // namespace
+
+void add_verify(CLI::App& app, std::function<Outcome()>& action) {
+  CLI::App* sub = app.add_subcommand("verify", "shoot rays at what a PVS leaves out; exit code 1 if one arrives");
+  auto args = std::make_shared<Args>();
+  args->scene.add_to(*sub);
+  args->solve.add_to(*sub, false);
+  auto* path = sub->add_option("--path", args->path, "CSV of poses; needs --reach");
+  sub->add_option("--record", args->record, "what a client was told, recorded by 'ivis walk --record'")->excludes(path);
+  sub->add_option("--rays", args->rays, "aimed rays a culled object")->capture_default_str()->check(CLI::Range(1, 1000000));
+  sub->add_option("--stride", args->stride, "every K-th pose")->capture_default_str()->check(CLI::Range(1, 1000000000));
+  sub->add_option("--seed", args->seed, "of the rays")->capture_default_str();
+  sub->add_flag("--json", args->json, "print JSON");
+  sub->callback([&action, args] {
+    if (args->path.empty() && args->record.empty()) throw CLI::RequiredError("--path or --record");
+    if (!args->path.empty() && args->solve.reach.empty()) throw CLI::RequiredError("--reach");
+    action = [args] { return run(*args); };
+  });
+}
+
+}  // namespace ivis::tool
