@@ -47,6 +47,7 @@ flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Hello& m) {
 }
 
 flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Welcome& m) {
+  IVIS_ASSERT(m.objects <= kMaxObjects, "the scene has no more objects than the protocol takes");
   flatbuffers::Offset<flatbuffers::Vector<std::uint8_t>> table = 0;
   if (!m.table.id.empty()) {
     IVIS_ASSERT(m.table.id.size() == m.objects, "the table has a row an object");
@@ -123,6 +124,10 @@ Result<Message> get(const fb::Welcome& m) {
     return s.error();
   Welcome out{m.version(), m.session(),        m.scene_hash(),      m.order_hash(),
               m.objects(), text_of(m.reach()), text_of(m.method()), {}};
+  // Also without a table: the client keeps bits an object.
+  if (out.objects > kMaxObjects)
+    return input_error("welcome: " + std::to_string(out.objects) + " objects, at most " +
+                       std::to_string(kMaxObjects));
   if (m.table() != nullptr) {
     auto table = unpack_table({m.table()->data(), m.table()->size()}, out.objects);
     if (!table) return table.error();

@@ -28,6 +28,7 @@ struct Hello {
   std::string reach;
   /// Send the table that maps ranks to ids, nodes and instances.
   bool want_table = true;
+  bool operator==(const Hello&) const = default;
 };
 
 /// rank -> (id, node, instance), structure of arrays, zstd-compressed inside the message.
@@ -36,6 +37,7 @@ struct ObjectTable {
   std::vector<ObjectId> id;
   std::vector<std::uint32_t> node;
   std::vector<std::uint32_t> instance;
+  bool operator==(const ObjectTable&) const = default;
 };
 
 /// Server -> client, the answer to Hello.
@@ -43,21 +45,23 @@ struct Welcome {
   std::uint16_t version = kProtocolVersion;
   std::uint64_t session = 0;  ///< named in every later message; a restarted server does not know it
   SceneHash scene_hash = 0;
-  std::uint64_t order_hash =
-      0;  ///< of the rank order, so that two ends with different orders say so
+  /// Of the rank order, so that two ends with different orders say so.
+  std::uint64_t order_hash = 0;
   std::uint32_t objects = 0;
   std::string reach;  ///< what every PVS of this session is valid for
   std::string method;
   ObjectTable table;  ///< empty unless wanted
+  bool operator==(const Welcome&) const = default;
 };
 
 /// Client -> server; the latest wins, none is answered twice.
 struct PoseMessage {
   std::uint64_t session = 0;
   std::uint32_t sequence = 0;  ///< rises by one a pose
-  std::uint32_t have_pvs =
-      0;  ///< sequence of the last PVS decoded, 0: none; acknowledges it as a base
+  /// Sequence of the last PVS decoded, 0: none; acknowledges it as a base.
+  std::uint32_t have_pvs = 0;
   Vec3 eye{0};
+  bool operator==(const PoseMessage&) const = default;
 };
 
 /// Server -> client, pushed.
@@ -68,10 +72,11 @@ struct PvsMessage {
   /// Centre of the cell it is valid for. Absent: the eye of the pose `sequence`, which the client
   /// knows as it sent it, to the last bit. Costs 26 bytes when present.
   std::optional<Vec3> eye;
-  bool everything =
-      false;  ///< all objects are listed, as nothing better can be said; payload empty
+  /// All objects are listed, as nothing better can be said; payload empty.
+  bool everything = false;
   std::uint32_t solve_us = 0;      ///< visibility time at the server, for latency accounts
   std::vector<std::byte> payload;  ///< wire/pvs_codec.h
+  bool operator==(const PvsMessage&) const = default;
 };
 
 enum class Refusal : std::uint8_t {
@@ -89,16 +94,20 @@ struct Refused {
   std::uint64_t session = 0;
   Refusal reason = Refusal::kMalformed;
   std::string text;
+  bool operator==(const Refused&) const = default;
 };
 
 /// Client -> server: the session is over.
 struct Bye {
   std::uint64_t session = 0;
+  bool operator==(const Bye&) const = default;
 };
 
 using Message = std::variant<Hello, Welcome, PoseMessage, PvsMessage, Refused, Bye>;
 
 inline constexpr std::size_t kMaxMessageBytes = 64U << 20U;
+/// A row of the table is 12 bytes.
+inline constexpr std::size_t kMaxObjects = kMaxMessageBytes / 12;
 inline constexpr std::size_t kMaxNameBytes = 256;   ///< reach, method
 inline constexpr std::size_t kMaxTextBytes = 1024;  ///< Refused::text
 

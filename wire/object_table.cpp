@@ -10,6 +10,8 @@ namespace ivis::wire {
 namespace {
 
 constexpr int kLevel = 3;
+constexpr std::size_t kTableRowBytes = kMaxMessageBytes / kMaxObjects;
+static_assert(kTableRowBytes == 12, "three columns of four bytes");
 
 // Each column as differences to its previous entry (modulo 2^32), one plane of bytes after the
 // other: the upper planes are runs of equal bytes, which zstd all but removes.
@@ -42,7 +44,6 @@ std::vector<std::uint8_t> pack_table(const ObjectTable& table) {
   const std::size_t n = table.id.size();
   IVIS_ASSERT(table.node.size() == n && table.instance.size() == n,
               "the table's columns have one length");
-  IVIS_ASSERT(n <= kMaxMessageBytes / kTableRowBytes, "the table fits a message");
   // Nodes and instances go by id, not by rank: ids ascend by node, then instance, so both are
   // near-constant steps there, and only the permutation itself costs bytes.
   std::vector<Rank> rank_of(n, static_cast<Rank>(n));
@@ -72,9 +73,7 @@ std::vector<std::uint8_t> pack_table(const ObjectTable& table) {
 
 Result<ObjectTable> unpack_table(std::span<const std::uint8_t> frame, std::uint32_t objects) {
   const std::size_t n = objects;
-  if (n > kMaxMessageBytes / kTableRowBytes)
-    return input_error("object table: " + std::to_string(n) + " objects, at most " +
-                       std::to_string(kMaxMessageBytes / kTableRowBytes) + " fit");
+  IVIS_ASSERT(n <= kMaxObjects, "the message's reader has checked the count");
   const std::size_t expected = n * kTableRowBytes;
   // Before allocating: the frame must be exactly one, and say that it opens to this size.
   const auto content = ZSTD_getFrameContentSize(frame.data(), frame.size());

@@ -11,14 +11,12 @@
 
 namespace ivis::wire {
 
-/// Bytes a row before compression.
-inline constexpr std::size_t kTableRowBytes = 12;
-
 /// Requires: columns of one length; `id` a permutation of 0..N-1.
 std::vector<std::uint8_t> pack_table(const ObjectTable& table);
 
 /// Errors: kInput if the frame does not hold exactly `objects` rows or the ids are no permutation.
-/// Allocates only what `objects` asks for, and only after the frame's own size agrees with it.
+/// Allocates only what `objects` (at most kMaxObjects) asks for, once the frame's own size agrees
+/// with it.
 Result<ObjectTable> unpack_table(std::span<const std::uint8_t> frame, std::uint32_t objects);
 
 }  // namespace ivis::wire

@@ -51,7 +51,8 @@ std::uint32_t block_context(std::uint32_t set, std::uint32_t before, bool left_c
   return (fill * 7 + size_class(std::popcount(set ^ before))) * 2 + (left_changed ? 1U : 0U);
 }
 
-/// The ranks of one changed block: each is likely to go the way of the two before it.
+/// The ranks of one changed block: each is likely to go the way of the two before it. `next` is
+/// looked at by an encoder only. Returns the block's new bits.
 template <class Coder>
 std::uint32_t code_block(Coder& coder, PvsModel& model, std::uint32_t set, std::uint32_t before,
                          std::uint32_t next, int ranks, std::uint32_t left_next,
@@ -63,8 +64,7 @@ std::uint32_t code_block(Coder& coder, PvsModel& model, std::uint32_t set, std::
     const bool changed = coder.code(model.rank[context], [&] { return ((next >> k) & 1U) != was; });
     const std::uint32_t now = was ^ (changed ? 1U : 0U);
     out |= now << k;
-    left_next = (left_next << 1U | now) & 3U;
-    // left_next keeps two ranks: bit 0 the nearer one
+    left_next = (left_next << 1U | now) & 3U;  // the nearer rank in bit 0
     left_before = earlier;
   }
   return out;
@@ -159,20 +159,20 @@ Result<PvsState> decode_pvs(std::span<const std::byte> bytes, const PvsState& ba
     return input_error("pvs: " + std::to_string(bytes.size()) + " bytes, at least " +
                        std::to_string(kCheckBytes));
   const auto code = bytes.subspan(kCheckBytes);
-  if (!code.empty() && code.back() == std::byte{0})
-    return input_error("pvs: a zero byte at the end");
   PvsState after;
   after.set = base.set;
   after.before = base.set;
   after.model = base.model;
   Decoding coder{BitDecoder(code)};
   code_difference(coder, base, after.model, after.set);
-  if (coder.bits.unread() != 0)
-    return input_error("pvs: " + std::to_string(coder.bits.unread()) + " bytes left over");
+  if (!coder.bits.ends_well())
+    return input_error("pvs: the code does not end with its last object (" +
+                       std::to_string(coder.bits.unread()) +
+                       " bytes left over): truncated, damaged, or coded against another base");
   const std::uint32_t stated =
       std::to_integer<std::uint32_t>(bytes[0]) | std::to_integer<std::uint32_t>(bytes[1]) << 8U;
   if (stated != check_of(after.set))
-    return input_error("pvs: check of the set differs: damaged, or coded against another base");
+    return input_error("pvs: the check of the set differs: damaged, or coded against another base");
   return after;
 }
 

@@ -58,6 +58,13 @@ struct Interval {
     else
       low = at + 1;
   }
+  /// The number in the interval with the most zero bytes at its end, the smallest of those.
+  std::uint32_t shortest() const {
+    std::uint32_t spare = 0xffffffffU;  // low bits that may be zero
+    while (((std::uint64_t{low} + spare) & ~std::uint64_t{spare}) > high)
+      spare >>= 8U;
+    return (low + spare) & ~spare;
+  }
   bool settled() const { return ((low ^ high) >> 24U) == 0; }
   void shift() {
     low <<= 8U;
@@ -77,10 +84,7 @@ class BitEncoder {
   /// Ends the code and hands it out: as few bytes as name a number in the interval. The decoder
   /// takes zeros for what is not there, so none is left at the end.
   std::vector<std::byte> finish() {
-    std::uint32_t spare = 0xffffffffU;  // low bits that may be zero
-    while (((std::uint64_t{interval_.low} + spare) & ~std::uint64_t{spare}) > interval_.high)
-      spare >>= 8U;
-    const std::uint32_t number = (interval_.low + spare) & ~spare;
+    const std::uint32_t number = interval_.shortest();
     for (std::uint32_t shift = 32; shift != 0; shift -= 8)
       bytes_.push_back(static_cast<std::byte>(number >> (shift - 8)));
     while (!bytes_.empty() && bytes_.back() == std::byte{0})
@@ -111,6 +115,11 @@ class BitDecoder {
   }
   /// Bytes of the code that no bit came from.
   std::size_t unread() const { return bytes_.size() - std::min(read_, bytes_.size()); }
+  /// Does the code end as an encoder ends it? Then no other code stands for the same bits.
+  bool ends_well() const {
+    return unread() == 0 && number_ == interval_.shortest() &&
+           (bytes_.empty() || bytes_.back() != std::byte{0});
+  }
 
  private:
   std::uint32_t next() {
