@@ -1,0 +1,244 @@
+#include "wire/messages.h"
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "made_up.h"
+
+namespace ivis::wire {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+PvsMessage pvs_of(std::size_t payload) {
+  PvsMessage m;
+  m.session = 0x1234567890abcdefU;
+  m.sequence = 7;
+  m.base = 6;
+  m.solve_us = 90;
+  m.payload.assign(payload, std::byte{0xa5});
+  return m;
+}
+
+std::vector<Message> samples() {
+  PvsMessage centred = pvs_of(31);
+  centred.eye = Vec3(1, -2, 3.25);
+  PvsMessage everything = pvs_of(0);
+  everything.everything = true;
+  Welcome w{1, 0xfedcba9876543210U, 5, 6, 3, "disc:1", "cull_map", {}};
+  Welcome with_table = w;
+  with_table.table = {{2, 0, 1}, {10, 10, 11}, {1, 0, 0}};
+  return {Hello{},
+          Hello{9, 77, "cylinder:1.5,0.1", false},
+          w,
+          with_table,
+          PoseMessage{1, 2, 3, {4, 5, -6}},
+          pvs_of(0),
+          pvs_of(1),
+          pvs_of(200),
+          centred,
+          everything,
+          Refused{12, Refusal::kScene, "another scene"},
+          Refused{},
+          Bye{99}};
+}
+
+std::string error_of(const Bytes& bytes) {
+  const auto m = decode(bytes);
+  return m ? std::string("no error") : m.error().message;
+}
+
+// Overwrites the only place where `from` occurs.
+template <class T>
+Bytes patched(Bytes bytes, T from, T to) {
+  std::size_t found = 0, at = 0;
+  for (std::size_t i = 0; i + sizeof(T) <= bytes.size(); ++i)
+    if (std::memcmp(bytes.data() + i, &from, sizeof(T)) == 0) {
+      at = i;
+      ++found;
+    }
+  EXPECT_EQ(found, 1U);
+  std::memcpy(bytes.data() + at, &to, sizeof(T));
+  return bytes;
+}
+
+TEST(WireMessages, ComeBackAsTheyWere) {
+  for (const Message& m : samples()) {
+    const auto back = decode(encode(m));
+    ASSERT_TRUE(back) << m.index() << ": " << back.error().message;
+    EXPECT_EQ(*back, m) << m.index();
+  }
+}
+
+TEST(WireMessages, TellEverythingFromNothingChanged) {
+  const auto nothing = decode(encode(pvs_of(0)));
+  ASSERT_TRUE(nothing);
+  EXPECT_FALSE(std::get<PvsMessage>(*nothing).everything);
+}
+
+TEST(WireMessages, PvsEnvelopeIsFortyEightBytes) {
+  EXPECT_EQ(encode(pvs_of(200)).size(), 248U);
+  EXPECT_EQ(encode(pvs_of(197)).size(), 248U);
+}
+
+TEST(WireMessages, ReadFromAnyAddress) {
+  for (const Message& m : samples()) {
+    const Bytes bytes = encode(m);
+    for (std::size_t offset = 0; offset < 8; ++offset) {
+      Bytes moved(offset);
+      moved.insert(moved.end(), bytes.begin(), bytes.end());
+      const auto back = decode(std::span(moved).subspan(offset));
+      ASSERT_TRUE(back) << offset;
+      EXPECT_EQ(*back, m);
+    }
+  }
+}
+
+TEST(WireMessages, CutTheirOwnStringsToTheBound) {
+  const auto back = decode(encode(Refused{1, Refusal::kBusy, std::string(5000, 'x')}));
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(std::get<Refused>(*back).text.size(), kMaxTextBytes);
+}
+
+TEST(WireMessages, LeaveAnotherVersionToTheReceiver) {
+  const auto back = decode(encode(Hello{77, 0, "", true}));
+  ASSERT_TRUE(back);
+  EXPECT_EQ(std::get<Hello>(*back).version, 77);
+}
+
+// ---- hostile bytes ----
+
+TEST(WireDecoder, RejectsTruncationAtEveryLength) {
+  for (const Message& m : samples()) {
+    const Bytes bytes = encode(m);
+    for (std::size_t n = 0; n < bytes.size(); ++n)
+      EXPECT_FALSE(decode(std::span(bytes).first(n))) << m.index() << " " << n;
+  }
+}
+
+TEST(WireDecoder, RejectsTrailingBytes) {
+  for (const Message& m : samples()) {
+    Bytes bytes = encode(m);
+    bytes.push_back(std::byte{0});
+    EXPECT_NE(error_of(bytes).find("prefix"), std::string::npos);
+  }
+}
+
+TEST(WireDecoder, RejectsMoreThanItsLimit) {
+  const Bytes bytes(kMaxMessageBytes + 1);
+  EXPECT_NE(error_of(bytes).find("at most 67108864"), std::string::npos);
+}
+
+TEST(WireDecoder, RejectsNumbersThatAreNotFinite) {
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
+        -std::numeric_limits<double>::infinity()}) {
+    const double x = 1234.5;
+    EXPECT_NE(error_of(patched(encode(PoseMessage{1, 2, 3, {0, x, 0}}), x, bad))
+                  .find("pose 2: eye is not finite"),
+              std::string::npos);
+    PvsMessage m = pvs_of(3);
+    m.eye = Vec3(0, 0, x);
+    EXPECT_NE(error_of(patched(encode(m), x, bad)).find("pvs 7: centre is not finite"),
+              std::string::npos);
+  }
+}
+
+TEST(WireDecoder, RejectsAnUnknownReason) {
+  for (const std::uint64_t reason : {0U, 8U, 255U}) {
+    // The reason is the byte that differs between two refusals.
+    const Bytes one = encode(Refused{1, Refusal::kScene, "x"}),
+                two = encode(Refused{1, Refusal::kReach, "x"});
+    Bytes bytes = one;
+    std::size_t differing = 0;
+    for (std::size_t i = 0; i < one.size(); ++i)
+      if (one[i] != two[i]) {
+        bytes[i] = static_cast<std::byte>(reason);
+        ++differing;
+      }
+    ASSERT_EQ(differing, 1U);
+    EXPECT_NE(error_of(bytes).find("unknown reason"), std::string::npos) << reason;
+  }
+}
+
+TEST(WireDecoder, RejectsMoreObjectsThanTheProtocolTakes) {
+  Welcome w{1, 2, 3, 4, 0x00345678, "disc:1", "m", {}};
+  EXPECT_NE(error_of(patched(encode(w), w.objects, 0xffffffffU))
+                .find("welcome: 4294967295 objects, at most 5592405"),
+            std::string::npos);
+}
+
+TEST(WireDecoder, RejectsATableOfAnotherLength) {
+  Welcome w{1, 2, 3, 4, 0, "disc:1", "m", {}};
+  w.objects = 0x1234;
+  for (std::uint32_t i = 0; i < w.objects; ++i) {
+    w.table.id.push_back(i);
+    w.table.node.push_back(0);
+    w.table.instance.push_back(i);
+  }
+  EXPECT_NE(error_of(patched(encode(w), w.objects, 0x00345678U))
+                .find("object table: frame holds 55920 bytes, expected 41160096"),
+            std::string::npos);
+}
+
+// The envelope's directory names its fields by position: blanking an entry makes the field absent.
+TEST(WireDecoder, RejectsAnEnvelopeWithoutAKnownKind) {
+  Bytes bytes = encode(Bye{5});
+  // Prefix, root offset, directory: its size, the table's size, then 2 bytes a field; bye is the
+  // 8th.
+  ASSERT_GE(bytes.size(), 28U);
+  std::uint16_t bye = 0;
+  std::uint32_t root = 0;
+  std::memcpy(&root, bytes.data() + 4, 4);
+  std::int32_t back = 0;
+  std::memcpy(&back, bytes.data() + 4 + root, 4);
+  std::memcpy(bytes.data() + static_cast<std::ptrdiff_t>(4 + root) - back + 4 + 2 * 7, &bye, 2);
+  EXPECT_EQ(error_of(bytes), "message: 0 known kinds in one envelope, expected 1");
+}
+
+TEST(WireDecoder, NeverFailsBadlyOnFlippedBits) {
+  for (const Message& m : samples()) {
+    const Bytes bytes = encode(m);
+    for (std::size_t bit = 0; bit < 8 * bytes.size(); ++bit) {
+      Bytes flipped = bytes;
+      flipped[bit / 8] ^= static_cast<std::byte>(1U << (bit % 8));
+      const auto back = decode(flipped);
+      if (back) encode(*back);  // what is let in is sound enough to be sent on
+    }
+  }
+}
+
+TEST(WireDecoder, NeverFailsBadlyOnRandomDamage) {
+  test::Numbers numbers(1);
+  const auto all = samples();
+  for (int i = 0; i < 20000; ++i) {
+    Bytes bytes = encode(all[static_cast<std::size_t>(i) % all.size()]);
+    for (std::uint32_t k = 1 + numbers.below(6); k > 0; --k) {
+      // Small and large numbers where offsets and counts are, behind a prefix that stays right.
+      const std::size_t at = 4 + numbers.below(static_cast<std::uint32_t>(bytes.size() - 4));
+      bytes[at] =
+          static_cast<std::byte>(numbers.one_in(2) ? numbers.below(16) : 255 - numbers.below(16));
+    }
+    const auto back = decode(bytes);
+    if (back) encode(*back);
+  }
+}
+
+TEST(WireDecoder, NeverFailsBadlyOnGarbage) {
+  test::Numbers numbers(2);
+  for (int i = 0; i < 20000; ++i) {
+    Bytes bytes(12 + numbers.below(120));
+    for (std::byte& b : bytes)
+      b = static_cast<std::byte>(numbers.one_in(2) ? 0 : numbers.below(256));
+    const auto prefix = static_cast<std::uint32_t>(bytes.size() - 4);
+    std::memcpy(bytes.data(), &prefix, 4);
+    const auto back = decode(bytes);
+    if (back) encode(*back);
+  }
+}
+
+}  // namespace
+}  // namespace ivis::wire
