@@ -6,6 +6,7 @@
 #include <queue>
 #include <string>
 
+#include "scenes/distance_steps.h"
 #include "scenes/random.h"
 
 namespace ivis {
@@ -88,35 +89,6 @@ class FreeGrid {
   std::size_t nx_, nz_;
   std::vector<std::uint8_t> free_;
 };
-
-/// Steps (city block or diagonal, whichever is shorter) to the nearest closed cell or border, at
-/// most 255.
-std::vector<std::uint8_t> steps_to_closed(const FreeGrid& grid) {
-  const std::size_t nx = grid.nx();
-  const std::size_t nz = grid.nz();
-  std::vector<std::uint8_t> d(grid.size());
-  const auto relax = [&](std::size_t i, std::size_t k, std::ptrdiff_t dir) {
-    const std::size_t cell = k * nx + i;
-    if (!grid.free(cell) || i == 0 || k == 0 || i + 1 == nx || k + 1 == nz) {
-      d[cell] = 0;
-      return;
-    }
-    const auto at = [&](std::ptrdiff_t di, std::ptrdiff_t dk) {
-      return d[static_cast<std::size_t>(static_cast<std::ptrdiff_t>(cell) + di +
-                                        dk * static_cast<std::ptrdiff_t>(nx))];
-    };
-    const int near = std::min({at(-1, -dir), at(0, -dir), at(1, -dir), at(-dir, 0)});
-    d[cell] = static_cast<std::uint8_t>(std::min<int>(d[cell], std::min(near + 1, 255)));
-  };
-  std::fill(d.begin(), d.end(), std::uint8_t{255});
-  for (std::size_t k = 0; k < nz; ++k)
-    for (std::size_t i = 0; i < nx; ++i)
-      relax(i, k, 1);
-  for (std::size_t k = nz; k-- > 0;)
-    for (std::size_t i = nx; i-- > 0;)
-      relax(i, k, -1);
-  return d;
-}
 
 /// Closes all but the largest connected piece; gives its size.
 std::size_t keep_largest(FreeGrid& grid) {
@@ -276,7 +248,8 @@ Result<std::vector<Pose>> street_path(const StreetObstacles& obstacles,
   if (keep_largest(grid) < 100)
     return invalid_argument("street path: no free place of 100 square metres that keeps " +
                             std::to_string(options.clearance_m) + " m from every building");
-  const auto steps = steps_to_closed(grid);
+  const auto steps =
+      distance_steps(grid.nx(), grid.nz(), [&](std::size_t c) { return !grid.free(c); });
   // Places in streets: not at a wall, with one in sight. If there are none (no buildings),
   // anywhere.
   std::vector<std::size_t> places;
