@@ -1,8 +1,10 @@
 #pragma once
-// The messages of wire/SPEC.md as values. Envelope: FlatBuffers (wire/ivis.fbs), verified before use.
+// The messages of wire/SPEC.md as values. Envelope: FlatBuffers (wire/ivis.fbs), verified before
+// use.
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
@@ -29,6 +31,7 @@ struct Hello {
 };
 
 /// rank -> (id, node, instance), structure of arrays, zstd-compressed inside the message.
+/// `id` is a permutation of 0..N-1.
 struct ObjectTable {
   std::vector<ObjectId> id;
   std::vector<std::uint32_t> node;
@@ -38,35 +41,48 @@ struct ObjectTable {
 /// Server -> client, the answer to Hello.
 struct Welcome {
   std::uint16_t version = kProtocolVersion;
-  std::uint64_t session = 0;      ///< named in every later message; a restarted server does not know it
+  std::uint64_t session = 0;  ///< named in every later message; a restarted server does not know it
   SceneHash scene_hash = 0;
-  std::uint64_t order_hash = 0;   ///< of the rank order, so that two ends with different orders say so
+  std::uint64_t order_hash =
+      0;  ///< of the rank order, so that two ends with different orders say so
   std::uint32_t objects = 0;
-  std::string reach;              ///< what every PVS of this session is valid for
+  std::string reach;  ///< what every PVS of this session is valid for
   std::string method;
-  ObjectTable table;              ///< empty unless wanted
+  ObjectTable table;  ///< empty unless wanted
 };
 
 /// Client -> server; the latest wins, none is answered twice.
 struct PoseMessage {
   std::uint64_t session = 0;
-  std::uint32_t sequence = 0;   ///< rises by one a pose
-  std::uint32_t have_pvs = 0;   ///< sequence of the last PVS decoded, 0: none; acknowledges it as a base
+  std::uint32_t sequence = 0;  ///< rises by one a pose
+  std::uint32_t have_pvs =
+      0;  ///< sequence of the last PVS decoded, 0: none; acknowledges it as a base
   Vec3 eye{0};
 };
 
 /// Server -> client, pushed.
 struct PvsMessage {
   std::uint64_t session = 0;
-  std::uint32_t sequence = 0;   ///< of the pose it answers
-  std::uint32_t base = 0;       ///< sequence of the PVS it is a difference to, 0: a full set
-  Vec3 eye{0};                  ///< centre of the cell it is valid for
-  bool everything = false;      ///< all objects are listed, as nothing better can be said; payload empty
-  std::uint32_t solve_us = 0;   ///< visibility time at the server, for latency accounts
+  std::uint32_t sequence = 0;  ///< of the pose it answers
+  std::uint32_t base = 0;      ///< sequence of the PVS it is a difference to, 0: a full set
+  /// Centre of the cell it is valid for. Absent: the eye of the pose `sequence`, which the client
+  /// knows as it sent it, to the last bit. Costs 26 bytes when present.
+  std::optional<Vec3> eye;
+  bool everything =
+      false;  ///< all objects are listed, as nothing better can be said; payload empty
+  std::uint32_t solve_us = 0;      ///< visibility time at the server, for latency accounts
   std::vector<std::byte> payload;  ///< wire/pvs_codec.h
 };
 
-enum class Refusal : std::uint8_t { kVersion = 1, kScene = 2, kReach = 3, kSession = 4, kMalformed = 5, kBusy = 6, kClosing = 7 };
+enum class Refusal : std::uint8_t {
+  kVersion = 1,
+  kScene = 2,
+  kReach = 3,
+  kSession = 4,
+  kMalformed = 5,
+  kBusy = 6,
+  kClosing = 7
+};
 
 /// Server -> client; the session named (0: none) is over unless the refusal is kBusy.
 struct Refused {
@@ -82,11 +98,19 @@ struct Bye {
 
 using Message = std::variant<Hello, Welcome, PoseMessage, PvsMessage, Refused, Bye>;
 
+inline constexpr std::size_t kMaxMessageBytes = 64U << 20U;
+inline constexpr std::size_t kMaxNameBytes = 256;   ///< reach, method
+inline constexpr std::size_t kMaxTextBytes = 1024;  ///< Refused::text
+
+/// One message as one frame. Strings are cut to their bounds. Requires: finite eyes; a table that
+/// is empty or has `objects` rows and whose ids are a permutation, at most kMaxMessageBytes / 12 of
+/// them.
 std::vector<std::byte> encode(const Message& message);
 
-/// Errors: kInput naming what is wrong. Bounds: at most kMaxMessageBytes, every count is checked against
-/// the bytes left (and the table's decompressed size against `objects`) before anything is allocated.
-inline constexpr std::size_t kMaxMessageBytes = 64U << 20U;
+/// Errors: kInput naming what is wrong. Bounds: at most kMaxMessageBytes, every count is checked
+/// against the bytes left (and the table's decompressed size against `objects`) before anything is
+/// allocated. The payload of a PVS is not looked into; a version other than ours is not an error
+/// here, so that the server can refuse it by name.
 Result<Message> decode(std::span<const std::byte> bytes);
 
 }  // namespace ivis::wire

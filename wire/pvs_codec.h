@@ -38,8 +38,8 @@ struct PvsState {
 /// hold. Requires set.size == base.set.size. Cost: see bench/pvs_codec_bench.cpp.
 std::vector<std::byte> encode_pvs(const RankSet& set, const PvsState& base, PvsState& after);
 
-/// Errors: kInput for bytes that are not such a difference (truncated, trailing, out of range): never
-/// reads outside `bytes`, time and memory are bounded by base.set.size and bytes.size().
+/// Errors: kInput for bytes that are not such a difference (truncated, trailing, out of range):
+/// never reads outside `bytes`, time and memory are bounded by base.set.size and bytes.size().
 Result<PvsState> decode_pvs(std::span<const std::byte> bytes, const PvsState& base);
 
 }  // namespace ivis::wire

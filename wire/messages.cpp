@@ -1,0 +1,219 @@
+#include "wire/messages.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <string_view>
+
+#include "core/assert.h"
+#include "ivis_generated.h"
+#include "wire/object_table.h"
+
+namespace ivis::wire {
+namespace {
+
+using flatbuffers::FlatBufferBuilder;
+
+constexpr std::size_t kSmallestMessage = 12;
+
+// Generous for our five kinds of table, hopeless for a hostile one.
+constexpr flatbuffers::uoffset_t kMaxDepth = 4;
+constexpr flatbuffers::uoffset_t kMaxTables = 4;
+
+bool finite(const Vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+fb::Vec3 to_fb(const Vec3& v) {
+  return {v.x, v.y, v.z};
+}
+Vec3 from_fb(const fb::Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+// ---- encoding: one function a message, children before the envelope ----
+
+flatbuffers::Offset<flatbuffers::String> put_string(FlatBufferBuilder& b, std::string_view s,
+                                                    std::size_t limit) {
+  if (s.empty()) return 0;
+  return b.CreateString(s.data(), std::min(s.size(), limit));
+}
+
+flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Hello& m) {
+  const auto reach = put_string(b, m.reach, kMaxNameBytes);
+  const auto hello = fb::CreateHello(b, m.version, m.want_table, m.scene_hash, reach);
+  fb::EnvelopeBuilder e(b);
+  e.add_hello(hello);
+  return e.Finish();
+}
+
+flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Welcome& m) {
+  flatbuffers::Offset<flatbuffers::Vector<std::uint8_t>> table = 0;
+  if (!m.table.id.empty()) {
+    IVIS_ASSERT(m.table.id.size() == m.objects, "the table has a row an object");
+    table = b.CreateVector(pack_table(m.table));
+  }
+  const auto reach = put_string(b, m.reach, kMaxNameBytes);
+  const auto method = put_string(b, m.method, kMaxNameBytes);
+  const auto welcome = fb::CreateWelcome(b, m.version, m.session, m.scene_hash, m.order_hash,
+                                         m.objects, reach, method, table);
+  fb::EnvelopeBuilder e(b);
+  e.add_welcome(welcome);
+  return e.Finish();
+}
+
+flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const PoseMessage& m) {
+  IVIS_ASSERT(finite(m.eye), "a pose is finite");
+  const fb::Pose pose(m.session, m.sequence, m.have_pvs, to_fb(m.eye));
+  fb::EnvelopeBuilder e(b);
+  e.add_pose(&pose);
+  return e.Finish();
+}
+
+flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const PvsMessage& m) {
+  IVIS_ASSERT(!m.eye || finite(*m.eye), "a cell's centre is finite");
+  flatbuffers::Offset<flatbuffers::Vector<std::uint8_t>> payload = 0;
+  if (!m.everything)
+    payload =
+        b.CreateVector(reinterpret_cast<const std::uint8_t*>(m.payload.data()), m.payload.size());
+  const fb::Pvs pvs(static_cast<std::uint32_t>(m.session),
+                    static_cast<std::uint32_t>(m.session >> 32U), m.sequence, m.base, m.solve_us);
+  const fb::Vec3 centre = to_fb(m.eye.value_or(Vec3(0)));
+  fb::EnvelopeBuilder e(b);
+  if (m.eye) e.add_centre(&centre);
+  e.add_payload(payload);
+  e.add_pvs(&pvs);
+  return e.Finish();
+}
+
+flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Refused& m) {
+  const auto text = put_string(b, m.text, kMaxTextBytes);
+  const auto refused = fb::CreateRefused(b, m.session, static_cast<std::uint8_t>(m.reason), text);
+  fb::EnvelopeBuilder e(b);
+  e.add_refused(refused);
+  return e.Finish();
+}
+
+flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Bye& m) {
+  const fb::Bye bye(m.session);
+  fb::EnvelopeBuilder e(b);
+  e.add_bye(&bye);
+  return e.Finish();
+}
+
+// ---- decoding: one function a message, after verification ----
+
+std::string text_of(const flatbuffers::String* s) {
+  return s == nullptr ? std::string() : s->str();
+}
+
+Status check_string(const flatbuffers::String* s, std::size_t limit, const char* what) {
+  if (s == nullptr || s->size() <= limit) return ok();
+  return input_error(std::string(what) + ": " + std::to_string(s->size()) + " bytes, at most " +
+                     std::to_string(limit));
+}
+
+Result<Message> get(const fb::Hello& m) {
+  if (const auto s = check_string(m.reach(), kMaxNameBytes, "hello: reach"); !s) return s.error();
+  return Message(Hello{m.version(), m.scene_hash(), text_of(m.reach()), m.want_table()});
+}
+
+Result<Message> get(const fb::Welcome& m) {
+  if (const auto s = check_string(m.reach(), kMaxNameBytes, "welcome: reach"); !s) return s.error();
+  if (const auto s = check_string(m.method(), kMaxNameBytes, "welcome: method"); !s)
+    return s.error();
+  Welcome out{m.version(), m.session(),        m.scene_hash(),      m.order_hash(),
+              m.objects(), text_of(m.reach()), text_of(m.method()), {}};
+  if (m.table() != nullptr) {
+    auto table = unpack_table({m.table()->data(), m.table()->size()}, out.objects);
+    if (!table) return table.error();
+    out.table = std::move(*table);
+  }
+  return Message(std::move(out));
+}
+
+Result<Message> get(const fb::Pose& m) {
+  const Vec3 eye = from_fb(m.eye());
+  if (!finite(eye))
+    return input_error("pose " + std::to_string(m.sequence()) + ": eye is not finite");
+  return Message(PoseMessage{m.session(), m.sequence(), m.have_pvs(), eye});
+}
+
+Result<Message> get(const fb::Envelope& e, const fb::Pvs& m) {
+  PvsMessage out;
+  out.session = std::uint64_t{m.session_low()} | (std::uint64_t{m.session_high()} << 32U);
+  out.sequence = m.sequence();
+  out.base = m.base();
+  out.solve_us = m.solve_us();
+  out.everything = e.payload() == nullptr;
+  if (e.centre() != nullptr) {
+    out.eye = from_fb(*e.centre());
+    if (!finite(*out.eye))
+      return input_error("pvs " + std::to_string(out.sequence) + ": centre is not finite");
+  }
+  if (!out.everything) {
+    const auto* first = reinterpret_cast<const std::byte*>(e.payload()->data());
+    out.payload.assign(first, first + e.payload()->size());
+  }
+  return Message(std::move(out));
+}
+
+Result<Message> get(const fb::Refused& m) {
+  if (const auto s = check_string(m.text(), kMaxTextBytes, "refused: text"); !s) return s.error();
+  if (m.reason() < static_cast<std::uint8_t>(Refusal::kVersion) ||
+      m.reason() > static_cast<std::uint8_t>(Refusal::kClosing))
+    return input_error("refused: unknown reason " + std::to_string(m.reason()));
+  return Message(Refused{m.session(), static_cast<Refusal>(m.reason()), text_of(m.text())});
+}
+
+Result<Message> get(const fb::Envelope& e) {
+  const int kinds = (e.pvs() != nullptr) + (e.pose() != nullptr) + (e.hello() != nullptr) +
+                    (e.welcome() != nullptr) + (e.refused() != nullptr) + (e.bye() != nullptr);
+  if (kinds != 1)
+    return input_error("message: " + std::to_string(kinds) +
+                       " known kinds in one envelope, expected 1");
+  if (e.pvs() == nullptr && (e.payload() != nullptr || e.centre() != nullptr))
+    return input_error("message: a payload or centre without a pvs");
+  if (e.pvs() != nullptr) return get(e, *e.pvs());
+  if (e.pose() != nullptr) return get(*e.pose());
+  if (e.hello() != nullptr) return get(*e.hello());
+  if (e.welcome() != nullptr) return get(*e.welcome());
+  if (e.refused() != nullptr) return get(*e.refused());
+  return Message(Bye{e.bye()->session()});
+}
+
+}  // namespace
+
+std::vector<std::byte> encode(const Message& message) {
+  FlatBufferBuilder b(512);
+  b.FinishSizePrefixed(std::visit([&](const auto& m) { return put(b, m); }, message));
+  IVIS_ASSERT(b.GetSize() <= kMaxMessageBytes, "a message keeps to its limit");
+  const auto* first = reinterpret_cast<const std::byte*>(b.GetBufferPointer());
+  return {first, first + b.GetSize()};
+}
+
+Result<Message> decode(std::span<const std::byte> bytes) {
+  if (bytes.size() > kMaxMessageBytes)
+    return input_error("message: " + std::to_string(bytes.size()) + " bytes, at most " +
+                       std::to_string(kMaxMessageBytes));
+  if (bytes.size() < kSmallestMessage)
+    return input_error("message: " + std::to_string(bytes.size()) + " bytes, at least " +
+                       std::to_string(kSmallestMessage));
+  // The transport hands out bytes at any address; FlatBuffers reads its numbers in place.
+  std::vector<std::uint64_t> aligned;
+  const auto* data = reinterpret_cast<const std::uint8_t*>(bytes.data());
+  if (reinterpret_cast<std::uintptr_t>(data) % alignof(std::uint64_t) != 0) {
+    aligned.resize(bytes.size() / sizeof(std::uint64_t) + 1);
+    std::memcpy(aligned.data(), bytes.data(), bytes.size());
+    data = reinterpret_cast<const std::uint8_t*>(aligned.data());
+  }
+  const auto stated = flatbuffers::GetPrefixedSize(data);
+  if (stated != bytes.size() - sizeof(stated))
+    return input_error("message: its prefix says " + std::to_string(stated) + " bytes, found " +
+                       std::to_string(bytes.size() - sizeof(stated)));
+  flatbuffers::Verifier verifier(data, bytes.size(), kMaxDepth, kMaxTables);
+  if (!fb::VerifySizePrefixedEnvelopeBuffer(verifier))
+    return input_error("message: not a valid envelope (offsets or sizes out of range)");
+  return get(*fb::GetSizePrefixedEnvelope(data));
+}
+
+}  // namespace ivis::wire
