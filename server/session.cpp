@@ -185,7 +185,6 @@ std::vector<std::byte> SessionTable::answer(Session& session) {
   wire::PvsMessage m;
   m.session = session.id;
   m.sequence = pose.sequence;
-  m.eye = pose.eye;
   m.solve_us = static_cast<std::uint32_t>(std::min<std::int64_t>(
       std::chrono::duration_cast<std::chrono::microseconds>(took).count(), UINT32_MAX));
   if (!pvs) ++counters_.solve_errors;
