@@ -106,7 +106,6 @@ Status set_level(Config& c, const std::string& text) {
 }
 
 Status set_method(Config& c, const std::string& text) {
-  if (text.empty()) return invalid_argument("found '', expected the name of a method");
   c.method = text;
   return ok();
 }
@@ -121,7 +120,7 @@ const std::vector<Key>& keys() {
                           std::string(kDefaultReach)},
        Kind::kText, get_text(&Config::reach), set_reach},
       {{"listen", "ADDRESS", "tcp://HOST:PORT or ipc://PATH"}, Kind::kText, get_text(&Config::listen), set_listen},
-      {{"method", "NAME", "visibility method"}, Kind::kText, get_text(&Config::method), set_method},
+      {{"method", "NAME", "visibility method, of `ivis pvs --help`; without: the first there"}, Kind::kText, get_text(&Config::method), set_method},
       {{"threads", "N", "threads inside one solve, 1 to 256"}, Kind::kNumber, get_number(&Config::threads),
        set_number(&Config::threads, 1, 256)},
       {{"log_level", "LEVEL", "debug, info, warn, error or off"}, Kind::kText,
@@ -231,7 +230,8 @@ Result<Configured> configure(const std::map<std::string, std::string>& flags, co
     std::string origin = "default";
     for (const Found& s : sources) {
       if (auto set = k.set(out.config, s.text); !set)
-        return Error{set.error().code, s.origin + ": key '" + key + "': " + set.error().message};
+        return Error{s.origin.starts_with("flag") ? ErrorCode::kInvalidArgument : ErrorCode::kInput,
+                     s.origin + ": key '" + key + "': " + set.error().message};
       origin = s.origin;
     }
     out.settings.push_back({key, k.get(out.config), origin});

@@ -20,7 +20,7 @@ struct Config {
   std::filesystem::path occluders;  ///< empty: shrink at start
   std::string reach;                ///< empty: the occluder file's, or kDefaultReach
   std::string listen = "tcp://127.0.0.1:7447";
-  std::string method = "cull-map";
+  std::string method;               ///< empty: the first of method_list()
   unsigned threads = 1;             ///< inside one solve
   LogLevel log_level = LogLevel::kInfo;
   bool json_logs = false;
@@ -56,8 +56,8 @@ Environment process_environment();
 
 /// Flag over environment over file over default. `flags`: key -> text. Paths in the file are relative to
 /// its folder.
-/// Errors: kIo; kInput or kInvalidArgument naming file, line and key, or variable, or flag; what was found and
-/// what was expected. Unknown keys are errors.
+/// Errors: kIo; kInput naming file, line and key, or variable; kInvalidArgument naming the flag; each
+/// with what was found and what was expected. Unknown keys are errors.
 Result<Configured> configure(const std::map<std::string, std::string>& flags, const Environment& environment,
                              const std::optional<std::filesystem::path>& file);
 

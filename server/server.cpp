@@ -19,6 +19,13 @@ constexpr int kMaxDrained = 4096;
 constexpr auto kLookAtStop = std::chrono::milliseconds(100);
 constexpr auto kHousekeeping = std::chrono::seconds(1);
 
+Error explain(const zmq::error_t& e, const std::string& listen) {
+  if (e.num() == EADDRINUSE) return connection_error("another server already listens on " + listen);
+  if (e.num() == EINVAL || e.num() == EPROTONOSUPPORT || e.num() == ENODEV)
+    return invalid_argument("'" + listen + "' is not an address of this machine, expected tcp://HOST:PORT or ipc://PATH");
+  return connection_error("cannot listen on " + listen + ": " + e.what());
+}
+
 }  // namespace
 
 struct Server::Impl {
@@ -119,11 +126,21 @@ Result<std::unique_ptr<Server>> Server::bind(const ServerOptions& options, const
     impl->endpoint = impl->socket.get(zmq::sockopt::last_endpoint);
     return std::unique_ptr<Server>(new Server(std::move(impl)));
   } catch (const zmq::error_t& e) {
-    if (e.num() == EADDRINUSE)
-      return connection_error("another server already listens on " + options.listen);
-    if (e.num() == EINVAL || e.num() == EPROTONOSUPPORT)
-      return invalid_argument("'" + options.listen + "' is not an address, expected tcp://HOST:PORT or ipc://PATH");
-    return connection_error("cannot listen on " + options.listen + ": " + e.what());
+    return explain(e, options.listen);
+  }
+}
+
+Status probe_address(const std::string& listen) {
+  if (auto claimed = claim_address(listen); !claimed) return claimed;
+  try {
+    zmq::context_t context(1);
+    zmq::socket_t socket(context, zmq::socket_type::router);
+    socket.set(zmq::sockopt::linger, 0);
+    socket.set(zmq::sockopt::ipv6, true);
+    socket.bind(listen);
+    return ok();
+  } catch (const zmq::error_t& e) {
+    return explain(e, listen);
   }
 }
 

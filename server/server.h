@@ -16,6 +16,9 @@ struct ServerOptions {
   SessionLimits limits;
 };
 
+/// Could a server be bound there now? Errors: those of Server::bind. Leaves nothing behind.
+Status probe_address(const std::string& listen);
+
 /// The socket around a SessionTable: one thread that takes in everything that waits, then answers one
 /// client, and so on; it never blocks on a client.
 /// Threads:   bind() and run() from one thread; `stop` may be set from any, and from a signal handler.
