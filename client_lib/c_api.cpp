@@ -1,0 +1,165 @@
+// The C interface: arguments are checked here, exceptions end here.
+
+#include <algorithm>
+#include <exception>
+#include <new>
+#include <utility>
+
+#include "client_lib/client.h"
+#include "client_lib/network_source.h"
+
+using ivis::client::Catalogue;
+using ivis::client::copy_text;
+
+namespace {
+
+ivis::Vec3 vec(const double p[3]) { return {p[0], p[1], p[2]}; }
+
+/// Out of memory is all that may be thrown inside; the caller is C.
+template <class F>
+ivis_status guarded(ivis_client* client, F&& body) {
+  try {
+    return body();
+  } catch (const std::exception& e) {
+    try {
+      return client->fail(IVIS_ERROR_IO, e.what());
+    } catch (...) {
+      return IVIS_ERROR_IO;
+    }
+  }
+}
+
+}  // namespace
+
+extern "C" {
+
+ivis_client_options ivis_client_options_default(void) {
+  ivis_client_options o{};
+  o.size = sizeof o;
+  o.endpoint = "tcp://127.0.0.1:7447";
+  o.policy = IVIS_POLICY_EVERYTHING;
+  o.connect_timeout_ms = 5000;
+  o.silence_timeout_ms = 2000;
+  return o;
+}
+
+ivis_status ivis_client_connect(const ivis_client_options* options, ivis_client** client, char* error,
+                                size_t error_size) {
+  if (client == nullptr) return IVIS_ERROR_ARGUMENT;
+  *client = nullptr;
+  const auto refuse = [&](ivis_status status, const std::string& text) {
+    copy_text(text, error, error_size);
+    return status;
+  };
+  try {
+    if (options == nullptr || options->size != sizeof(ivis_client_options))
+      return refuse(IVIS_ERROR_ARGUMENT, "options were not made by ivis_client_options_default()");
+    if (options->endpoint == nullptr) return refuse(IVIS_ERROR_ARGUMENT, "no endpoint");
+    if (options->policy < IVIS_POLICY_EVERYTHING || options->policy > IVIS_POLICY_INCOMPLETE)
+      return refuse(IVIS_ERROR_ARGUMENT, "unknown policy " + std::to_string(static_cast<int>(options->policy)));
+    if (options->connect_timeout_ms < 0 || options->silence_timeout_ms <= 0)
+      return refuse(IVIS_ERROR_ARGUMENT, "a timeout is negative or zero");
+    ivis::client::NetworkOptions network;
+    network.endpoint = options->endpoint;
+    network.scene_hash = options->scene_hash;
+    network.reach = options->reach != nullptr ? options->reach : "";
+    network.silence = std::chrono::milliseconds(options->silence_timeout_ms);
+    auto source = ivis::client::NetworkSource::open(network);
+    if (!source) return refuse(ivis::client::status_of(source.error()), source.error().message);
+    auto made = std::make_unique<ivis_client>(std::move(*source), options->policy);
+    if (options->connect_timeout_ms > 0)
+      if (const ivis_status met = made->meet(std::chrono::milliseconds(options->connect_timeout_ms)); met != IVIS_OK)
+        return refuse(met, network.endpoint + ": " + made->error());
+    *client = made.release();
+    return IVIS_OK;
+  } catch (const std::exception& e) {
+    return refuse(IVIS_ERROR_IO, e.what());
+  }
+}
+
+ivis_client* ivis_client_adopt_source_(void* pvs_source, ivis_policy policy) {
+  std::unique_ptr<ivis::client::PvsSource> source(static_cast<ivis::client::PvsSource*>(pvs_source));
+  return new (std::nothrow) ivis_client(std::move(source), policy);
+}
+
+void ivis_client_close(ivis_client* client) { delete client; }
+
+ivis_status ivis_client_pose(ivis_client* client, const double eye[3]) {
+  if (client == nullptr || eye == nullptr) return IVIS_ERROR_ARGUMENT;
+  return guarded(client, [&] { return client->pose(vec(eye)); });
+}
+
+ivis_status ivis_client_view(ivis_client* client, const double eye[3], ivis_frame* out) {
+  if (out == nullptr) return IVIS_ERROR_ARGUMENT;
+  *out = ivis_frame{};
+  out->everything = 1;
+  if (client == nullptr || eye == nullptr) return IVIS_ERROR_ARGUMENT;
+  return guarded(client, [&] { return client->view(vec(eye), *out); });
+}
+
+ivis_status ivis_client_frame(ivis_client* client, const double eye[3], ivis_frame* out) {
+  const ivis_status sent = ivis_client_pose(client, eye);
+  const ivis_status seen = ivis_client_view(client, eye, out);
+  return sent != IVIS_OK ? sent : seen;
+}
+
+ivis_status ivis_client_wait(ivis_client* client, int32_t timeout_ms) {
+  if (client == nullptr || timeout_ms < 0) return IVIS_ERROR_ARGUMENT;
+  return guarded(client, [&] { return client->wait(std::chrono::milliseconds(timeout_ms)); });
+}
+
+void ivis_client_stats(const ivis_client* client, ivis_stats* out) {
+  if (out == nullptr) return;
+  *out = client != nullptr ? client->stats() : ivis_stats{};
+}
+
+ivis_status ivis_client_info(const ivis_client* client, ivis_info* out) {
+  if (client == nullptr || out == nullptr) return IVIS_ERROR_ARGUMENT;
+  *out = ivis_info{0, 0, "", ""};
+  const Catalogue* c = client->source().catalogue();
+  if (c == nullptr) return IVIS_ERROR_CONNECTION;
+  *out = {c->scene_hash, c->objects(), c->reach.c_str(), c->method.c_str()};
+  return IVIS_OK;
+}
+
+ivis_status ivis_object_node(const ivis_client* client, uint32_t id, uint32_t* node, uint32_t* instance) {
+  if (client == nullptr) return IVIS_ERROR_ARGUMENT;
+  const Catalogue* c = client->source().catalogue();
+  if (c == nullptr) return IVIS_ERROR_CONNECTION;
+  if (id >= c->objects()) return IVIS_ERROR_ARGUMENT;
+  if (node != nullptr) *node = c->node[id];
+  if (instance != nullptr) *instance = c->instance[id];
+  return IVIS_OK;
+}
+
+ivis_status ivis_object_id(const ivis_client* client, uint32_t node, uint32_t instance, uint32_t* id) {
+  if (client == nullptr || id == nullptr) return IVIS_ERROR_ARGUMENT;
+  const Catalogue* c = client->source().catalogue();
+  if (c == nullptr) return IVIS_ERROR_CONNECTION;
+  const auto [first, last] = std::equal_range(c->node.begin(), c->node.end(), node);
+  const auto from = c->instance.begin() + (first - c->node.begin());
+  const auto to = c->instance.begin() + (last - c->node.begin());
+  const auto found = std::lower_bound(from, to, instance);
+  if (found == to || *found != instance) return IVIS_ERROR_ARGUMENT;
+  *id = static_cast<std::uint32_t>(found - c->instance.begin());
+  return IVIS_OK;
+}
+
+const char* ivis_client_error(const ivis_client* client) {
+  return client != nullptr ? client->error().c_str() : "no client";
+}
+
+const char* ivis_status_name(ivis_status status) {
+  switch (status) {
+    case IVIS_OK: return "ok";
+    case IVIS_ERROR_ARGUMENT: return "invalid argument";
+    case IVIS_ERROR_INPUT: return "bad input";
+    case IVIS_ERROR_IO: return "input/output";
+    case IVIS_ERROR_MISMATCH: return "mismatch";
+    case IVIS_ERROR_CONNECTION: return "connection";
+    case IVIS_ERROR_TIMEOUT: return "timeout";
+  }
+  return "unknown";
+}
+
+}  // extern "C"

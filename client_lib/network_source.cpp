@@ -1,0 +1,316 @@
+#include "client_lib/network_source.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cerrno>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include <zmq.hpp>
+
+#include "client_lib/pvs_history.h"
+#include "wire/messages.h"
+
+namespace ivis::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kHelloAgain = std::chrono::milliseconds(1000);
+constexpr auto kBusyPause = std::chrono::milliseconds(1000);
+// While something waits to be sent, nothing else would wake wait().
+constexpr auto kSendAgain = std::chrono::milliseconds(2);
+constexpr auto kTimers = std::chrono::milliseconds(50);
+constexpr std::size_t kRememberedEyes = 1024;
+
+std::string hex(std::uint64_t v) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string text;
+  for (int shift = 60; shift >= 0; shift -= 4) text += kDigits[(v >> static_cast<unsigned>(shift)) & 15U];
+  return text;
+}
+
+}  // namespace
+
+struct NetworkSource::Impl {
+  explicit Impl(const NetworkOptions& o)
+      : options(o), scene_hash(o.scene_hash), context(1), socket(context, zmq::socket_type::dealer) {
+    socket.set(zmq::sockopt::linger, 100);       // ms, for Bye
+    socket.set(zmq::sockopt::immediate, true);   // nothing is queued for a server that is not there
+    socket.set(zmq::sockopt::sndhwm, 8);
+    socket.set(zmq::sockopt::rcvhwm, 256);
+    socket.set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(wire::kMaxMessageBytes));
+    socket.set(zmq::sockopt::reconnect_ivl, 50);
+    socket.set(zmq::sockopt::reconnect_ivl_max, 1000);
+    socket.set(zmq::sockopt::heartbeat_ivl, 2000);
+    socket.set(zmq::sockopt::heartbeat_timeout, 6000);
+    socket.set(zmq::sockopt::ipv6, true);
+    socket.connect(options.endpoint);
+  }
+
+  ~Impl() {
+    if (session == 0) return;
+    try {
+      static_cast<void>(put(wire::Bye{session}));
+    } catch (const std::exception&) {  // the server will see us expire
+    }
+  }
+
+  bool put(const wire::Message& message) {
+    const std::vector<std::byte> bytes = wire::encode(message);
+    return socket.send(zmq::buffer(bytes), zmq::send_flags::dontwait).has_value();
+  }
+
+  /// Sends what is due and can go.
+  void pump() {
+    if (failed) return;
+    const auto now = Clock::now();
+    // Silence: a pose is unanswered and nothing at all has come for too long.
+    if (session != 0 && waiting_since && now - *waiting_since > options.silence) {
+      begin_again("the server has been silent for " + std::to_string(options.silence.count()) + " ms", now);
+    }
+    if (session == 0) {
+      if (now >= next_hello &&
+          put(wire::Hello{wire::kProtocolVersion, scene_hash, options.reach, true}))
+        next_hello = now + kHelloAgain;
+      return;
+    }
+    if (!pose_due) return;
+    const Eye& eye = eyes[sequence % kRememberedEyes];
+    // What is not known as a base is not acknowledged: the answer then is a full set.
+    if (!put(wire::PoseMessage{session, sequence, history.newest(), eye.at})) return;
+    pose_due = false;
+    if (!waiting_since) waiting_since = now;
+  }
+
+  void begin_again(std::string why, Clock::time_point hello_at) {
+    session = 0;
+    next_hello = hello_at;
+    waiting_since.reset();
+    last_trouble = std::move(why);
+  }
+
+  void fail(Error error) {
+    session = 0;
+    failed = std::move(error);
+  }
+
+  /// Takes in all that has arrived. Only the newest PVS is decoded: each names its own base.
+  void drain() {
+    zmq::message_t message;
+    bool any = false;
+    while (!failed && socket.recv(message, zmq::recv_flags::dontwait)) {
+      any = true;
+      if (message.more()) {  // a server sends single frames
+        ++counted.bad_messages;
+        do static_cast<void>(socket.recv(message, zmq::recv_flags::none)); while (message.more());
+        continue;
+      }
+      auto decoded = wire::decode({static_cast<const std::byte*>(message.data()), message.size()});
+      if (!decoded) {
+        ++counted.bad_messages;
+        last_trouble = decoded.error().message;
+        continue;
+      }
+      if (auto* pvs = std::get_if<wire::PvsMessage>(&*decoded)) {
+        if (pvs->session != session || pvs->sequence > sequence || pvs->sequence <= answered) continue;
+        ++counted.answers;
+        counted.bytes += message.size();
+        if (!newest || pvs->sequence > newest->sequence) newest = std::move(*pvs);
+      } else if (auto* welcome = std::get_if<wire::Welcome>(&*decoded)) {
+        handle(*welcome);
+      } else if (const auto* refused = std::get_if<wire::Refused>(&*decoded)) {
+        handle(*refused);
+      } else {
+        ++counted.bad_messages;
+      }
+    }
+    if (any && waiting_since) waiting_since = Clock::now();
+    if (newest && !failed) {
+      const wire::PvsMessage pvs = std::move(*newest);
+      newest.reset();
+      take(pvs);
+    }
+  }
+
+  void handle(wire::Welcome& w) {
+    // A second Welcome answers a Hello that was repeated too soon; the server knows its session only.
+    const bool was_lost = session == 0;
+    if (w.version != wire::kProtocolVersion)
+      return fail(mismatch("the server speaks version " + std::to_string(w.version) + ", the client " +
+                           std::to_string(wire::kProtocolVersion)));
+    if (scene_hash != 0 && w.scene_hash != scene_hash)
+      return fail(mismatch("the client's scene has the hash " + hex(scene_hash) + ", the server's " + hex(w.scene_hash)));
+    auto reach_served = Reach::parse(w.reach);
+    if (w.session == 0 || !reach_served || w.table.id.size() != w.objects ||
+        w.table.node.size() != w.objects || w.table.instance.size() != w.objects) {
+      ++counted.bad_messages;
+      last_trouble = "a Welcome that contradicts itself";
+      return;
+    }
+    Catalogue told;
+    told.scene_hash = w.scene_hash;
+    told.reach = w.reach;
+    told.method = w.method;
+    told.node.resize(w.objects);
+    told.instance.resize(w.objects);
+    for (Rank r = 0; r < w.objects; ++r) {
+      told.node[w.table.id[r]] = w.table.node[r];
+      told.instance[w.table.id[r]] = w.table.instance[r];
+    }
+    if (auto sound = check_catalogue(told); !sound) {
+      ++counted.bad_messages;
+      last_trouble = sound.error().message;
+      return;
+    }
+    if (catalogue && (told.node != catalogue->node || told.instance != catalogue->instance))
+      return fail(mismatch("the server's objects have changed under the scene hash " + hex(w.scene_hash)));
+    if (catalogue && was_lost) ++counted.reconnects;
+    catalogue = std::move(told);
+    id_of = std::move(w.table.id);
+    reach = *reach_served;
+    scene_hash = w.scene_hash;
+    session = w.session;
+    history.clear();
+    newest.reset();
+    last_trouble.clear();
+    waiting_since.reset();
+    pose_due = sequence > answered;
+  }
+
+  void handle(const wire::Refused& r) {
+    // Sessions are numbered at random: a refusal of one that is not ours is about the past.
+    if (r.session != 0 && r.session != session) return;
+    const std::string text = "the server refused: " + r.text;
+    switch (r.reason) {
+      case wire::Refusal::kVersion:
+      case wire::Refusal::kScene:
+      case wire::Refusal::kReach: return fail(mismatch(text));
+      case wire::Refusal::kBusy: return begin_again(text, Clock::now() + kBusyPause);
+      case wire::Refusal::kClosing:
+      case wire::Refusal::kMalformed: return begin_again(text, Clock::now() + kHelloAgain);
+      case wire::Refusal::kSession: return begin_again(text, Clock::now());
+    }
+  }
+
+  void take(const wire::PvsMessage& m) {
+    const Eye& eye = eyes[m.sequence % kRememberedEyes];
+    if (!m.eye && eye.sequence != m.sequence) return;  // too old to know where it was
+    const auto bad = [&](std::string why) {
+      // Acknowledging nothing makes the next answer a full set, so that this cannot last.
+      ++counted.bad_messages;
+      last_trouble = std::move(why);
+      history.clear();
+    };
+    Answer a;
+    a.sequence = m.sequence;
+    a.cell = {m.eye.value_or(eye.at), reach};
+    a.solve_ms = m.solve_us / 1000.0;
+    a.everything = m.everything;
+    if (m.everything) {
+      a.count = catalogue->objects();
+    } else {
+      const wire::PvsState empty(catalogue->objects());
+      const wire::PvsState* base = m.base == 0 ? &empty : history.base(m.base);
+      if (base == nullptr) return bad("a PVS against a base that is not here");
+      auto state = wire::decode_pvs(m.payload, *base);
+      if (!state) return bad(state.error().message);
+      a.bits = std::move(spare);
+      a.bits.assign(words_for(catalogue->objects()), 0);
+      for (std::size_t w = 0; w < state->set.words.size(); ++w) {
+        for (std::uint64_t left = state->set.words[w]; left != 0; left &= left - 1) {
+          const ObjectId id = id_of[w * 64 + static_cast<std::size_t>(std::countr_zero(left))];
+          a.bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
+          ++a.count;
+        }
+      }
+      history.add(m.sequence, std::move(*state));
+    }
+    answered = m.sequence;
+    if (answered == sequence) waiting_since.reset();
+    last_trouble.clear();
+    ready = std::move(a);
+  }
+
+  struct Eye {
+    std::uint32_t sequence = 0;
+    Vec3 at{0};
+  };
+  NetworkOptions options;
+  SceneHash scene_hash;
+  std::optional<Catalogue> catalogue;
+  std::vector<ObjectId> id_of;  ///< by rank
+  Reach reach;
+  std::uint64_t session = 0;  ///< 0: greeting
+  Clock::time_point next_hello{};
+  std::optional<Clock::time_point> waiting_since;  ///< last sign of life with a pose unanswered
+  std::array<Eye, kRememberedEyes> eyes{};
+  std::uint32_t sequence = 0;  ///< of the latest pose
+  std::uint32_t answered = 0;  ///< of the latest pose that was
+  bool pose_due = false;
+  PvsHistory history;
+  std::optional<wire::PvsMessage> newest;
+  std::optional<Answer> ready;
+  IdBits spare;
+  std::optional<Error> failed;
+  std::string last_trouble = "connecting";
+  SourceStats counted;
+  zmq::context_t context;
+  zmq::socket_t socket;
+};
+
+NetworkSource::NetworkSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+NetworkSource::~NetworkSource() = default;
+
+Result<std::unique_ptr<NetworkSource>> NetworkSource::open(const NetworkOptions& options) {
+  if (!options.endpoint.starts_with("tcp://") && !options.endpoint.starts_with("ipc://"))
+    return invalid_argument("'" + options.endpoint + "' is not an address, expected tcp://HOST:PORT or ipc://PATH");
+  if (!options.reach.empty())
+    if (auto reach = Reach::parse(options.reach); !reach) return reach.error();
+  try {
+    return std::unique_ptr<NetworkSource>(new NetworkSource(std::make_unique<Impl>(options)));
+  } catch (const zmq::error_t& e) {
+    return invalid_argument("cannot connect to '" + options.endpoint + "': " + e.what());
+  }
+}
+
+const Catalogue* NetworkSource::catalogue() const { return impl_->catalogue ? &*impl_->catalogue : nullptr; }
+
+void NetworkSource::send(std::uint32_t sequence, const Vec3& eye) {
+  impl_->sequence = sequence;
+  impl_->eyes[sequence % kRememberedEyes] = {sequence, eye};
+  impl_->pose_due = true;
+  impl_->pump();
+}
+
+bool NetworkSource::receive(Answer& answer) {
+  impl_->drain();
+  impl_->pump();
+  if (!impl_->ready) return false;
+  impl_->spare = std::move(answer.bits);
+  answer = std::move(*impl_->ready);
+  impl_->ready.reset();
+  return true;
+}
+
+void NetworkSource::wait(Time deadline) {
+  const bool unsent = impl_->session == 0 ? Clock::now() >= impl_->next_hello : impl_->pose_due;
+  const auto longest = unsent ? kSendAgain : kTimers;
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
+  if (left.count() <= 0) return;
+  zmq::pollitem_t item{impl_->socket.handle(), 0, ZMQ_POLLIN, 0};
+  try {
+    zmq::poll(&item, 1, std::min<std::chrono::milliseconds>(left, longest));
+  } catch (const zmq::error_t& e) {
+    if (e.num() != EINTR) throw;
+  }
+}
+
+bool NetworkSource::connected() const { return impl_->session != 0; }
+const Error* NetworkSource::failure() const { return impl_->failed ? &*impl_->failed : nullptr; }
+std::string NetworkSource::trouble() const { return impl_->last_trouble; }
+SourceStats NetworkSource::stats() const { return impl_->counted; }
+
+}  // namespace ivis::client

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include "client_lib/source.h"
+
+namespace ivis::client {
+
+struct NetworkOptions {
+  std::string endpoint;
+  SceneHash scene_hash = 0;  ///< 0: whatever the server has; held to from then on
+  std::string reach;         ///< empty: the server's
+  std::chrono::milliseconds silence{2000};  ///< unanswered for so long: greet anew
+};
+
+/// A session with a server, kept alive: whenever the server is lost, says so, or no longer knows the
+/// session, Hello is said again until it answers. Bytes are decoded in the caller's thread.
+/// What ends it for good: a server with another scene, version, or too small a reach.
+class NetworkSource : public PvsSource {
+ public:
+  /// Errors: kInvalidArgument for an endpoint that is not one. Does not wait for the server.
+  static Result<std::unique_ptr<NetworkSource>> open(const NetworkOptions& options);
+  ~NetworkSource() override;
+
+  const Catalogue* catalogue() const override;
+  void send(std::uint32_t sequence, const Vec3& eye) override;
+  bool receive(Answer& answer) override;
+  void wait(Time deadline) override;
+  bool connected() const override;
+  const Error* failure() const override;
+  std::string trouble() const override;
+  SourceStats stats() const override;
+
+ private:
+  struct Impl;
+  explicit NetworkSource(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ivis::client

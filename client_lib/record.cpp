@@ -1,0 +1,200 @@
+#include "client_lib/record.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+#include "core/path.h"
+
+namespace ivis::client {
+namespace {
+
+constexpr std::size_t kMaxRecordBytes = std::size_t{2} << 30U;
+constexpr std::string_view kMagic = "ivis-record 1";
+
+template <class N>
+void put(std::string& out, N v) {
+  std::array<char, 32> buffer{};
+  const auto r = std::to_chars(buffer.data(), buffer.data() + buffer.size(), v);
+  out.append(buffer.data(), r.ptr);
+}
+
+/// Takes words off a line.
+class Words {
+ public:
+  explicit Words(std::string_view line) : rest_(line) {}
+  std::string_view next() {
+    const auto space = rest_.find(' ');
+    const std::string_view word = rest_.substr(0, space);
+    rest_ = space == std::string_view::npos ? std::string_view() : rest_.substr(space + 1);
+    return word;
+  }
+  bool done() const { return rest_.empty(); }
+  std::size_t left() const { return rest_.size(); }
+  std::string_view rest() const { return rest_; }
+
+ private:
+  std::string_view rest_;
+};
+
+template <class N>
+std::optional<N> number(std::string_view word, int base = 10) {
+  N v{};
+  std::from_chars_result r{};
+  if constexpr (std::is_floating_point_v<N>) r = std::from_chars(word.data(), word.data() + word.size(), v);
+  else r = std::from_chars(word.data(), word.data() + word.size(), v, base);
+  if (r.ec != std::errc{} || r.ptr != word.data() + word.size()) return std::nullopt;
+  return v;
+}
+
+std::string shown(std::string_view text) { return "'" + std::string(text.substr(0, 60)) + "'"; }
+
+Result<Vec3> point(Words& words, const char* what) {
+  Vec3 p{0};
+  for (int k = 0; k < 3; ++k) {
+    const std::string_view word = words.next();
+    const auto v = number<double>(word);
+    if (!v || !std::isfinite(*v))
+      return input_error(std::string(what) + ": found " + shown(word) + ", expected a finite number");
+    p[k] = *v;
+  }
+  return p;
+}
+
+Status ids(Words& words, std::uint32_t objects, std::vector<ObjectId>& out) {
+  const std::string_view word = words.next();
+  const auto count = number<std::uint32_t>(word);
+  // An id takes at least a digit, and a space before the next.
+  if (!count || *count > objects || *count > (words.left() + 1) / 2)
+    return input_error("found " + shown(word) + " as the number of ids, expected at most " +
+                       std::to_string(std::min<std::size_t>(objects, (words.left() + 1) / 2)));
+  out.reserve(*count);
+  for (std::uint32_t i = 0; i < *count; ++i) {
+    const std::string_view text = words.next();
+    const auto step = number<std::uint32_t>(text);
+    const std::uint64_t id = step ? std::uint64_t{*step} + (i == 0 ? 0 : out.back()) : objects;
+    if (!step || (i != 0 && *step == 0) || id >= objects)
+      return input_error("found " + shown(text) + " as id or gap, expected ids that ascend and are below " +
+                         std::to_string(objects));
+    out.push_back(static_cast<ObjectId>(id));
+  }
+  return ok();
+}
+
+Result<RecordedFrame> frame(std::string_view line, const Record& record) {
+  Words words(line);
+  if (words.next() != "frame") return input_error("found " + shown(line) + ", expected 'frame'");
+  RecordedFrame f;
+  f.pvs.scene_hash = record.scene_hash;
+  f.pvs.cell.reach = record.reach;
+  auto cell_eye = point(words, "the cell's eye");
+  if (!cell_eye) return cell_eye.error();
+  f.pvs.cell.eye = *cell_eye;
+  auto eye = point(words, "the eye");
+  if (!eye) return eye.error();
+  f.eye = *eye;
+  const std::string_view covered = words.next();
+  if (covered != "covered" && covered != "uncovered")
+    return input_error("found " + shown(covered) + ", expected 'covered' or 'uncovered'");
+  f.covered = covered == "covered";
+  if (words.rest() == "everything") {
+    f.everything = true;
+    f.pvs.everything_because = "told so";
+    return f;
+  }
+  if (f.covered && !f.pvs.cell.contains(f.eye))
+    return input_error("a covered frame whose eye is outside its cell");
+  if (auto read = ids(words, record.objects, f.pvs.objects); !read) return read.error();
+  if (!words.done()) return input_error("found " + shown(words.rest()) + " after the last id");
+  return f;
+}
+
+}  // namespace
+
+std::string encode_record(const Record& record) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string out(kMagic);
+  out += "\nscene ";
+  for (int shift = 60; shift >= 0; shift -= 4)
+    out += kDigits[(record.scene_hash >> static_cast<unsigned>(shift)) & 15U];
+  out += "\nreach " + record.reach.to_string() + "\nobjects ";
+  put(out, record.objects);
+  out += '\n';
+  for (const RecordedFrame& f : record.frames) {
+    out += "frame";
+    for (const Vec3& p : {f.pvs.cell.eye, f.eye}) {
+      for (int k = 0; k < 3; ++k) {
+        out += ' ';
+        put(out, p[k]);
+      }
+    }
+    out += f.covered ? " covered " : " uncovered ";
+    if (f.everything) {
+      out += "everything\n";
+      continue;
+    }
+    put(out, f.pvs.objects.size());
+    ObjectId before = 0;
+    for (const ObjectId id : f.pvs.objects) {
+      out += ' ';
+      put(out, id - before);
+      before = id;
+    }
+    out += '\n';
+  }
+  return out;
+}
+
+Result<Record> decode_record(std::string_view text, const std::string& name) {
+  Record record;
+  std::size_t line_number = 0;
+  const auto next_line = [&] {
+    ++line_number;
+    const auto end = text.find('\n');
+    const std::string_view line = text.substr(0, end);
+    text = end == std::string_view::npos ? std::string_view() : text.substr(end + 1);
+    return line;
+  };
+  const auto wrong = [&](const std::string& why) {
+    return input_error("'" + name + "' line " + std::to_string(line_number) + ": " + why);
+  };
+  const auto field = [&](std::string_view key) -> std::optional<std::string_view> {
+    Words words(next_line());
+    if (words.next() != key) return std::nullopt;
+    return words.rest();
+  };
+  if (const auto magic = next_line(); magic != kMagic)
+    return wrong("found " + shown(magic) + ", expected '" + std::string(kMagic) + "'");
+  const auto scene = field("scene");
+  const auto hash = scene && scene->size() == 16 ? number<std::uint64_t>(*scene, 16) : std::nullopt;
+  if (!hash) return wrong("expected 'scene' and 16 hexadecimal digits");
+  record.scene_hash = *hash;
+  const auto reach = field("reach");
+  if (!reach) return wrong("expected 'reach'");
+  auto parsed = Reach::parse(*reach);
+  if (!parsed) return wrong(parsed.error().message);
+  record.reach = *parsed;
+  const auto objects = field("objects");
+  const auto count = objects ? number<std::uint32_t>(*objects) : std::nullopt;
+  if (!count) return wrong("expected 'objects' and their number");
+  record.objects = *count;
+  while (!text.empty()) {
+    auto f = frame(next_line(), record);
+    if (!f) return wrong(f.error().message);
+    record.frames.push_back(std::move(*f));
+  }
+  return record;
+}
+
+Status write_record(const std::filesystem::path& file, const Record& record) {
+  return write_file_whole(file, encode_record(record));
+}
+
+Result<Record> read_record(const std::filesystem::path& file) {
+  const auto text = read_file_whole(file, kMaxRecordBytes);
+  if (!text) return text.error();
+  return decode_record(*text, file.string());
+}
+
+}  // namespace ivis::client

@@ -1,0 +1,74 @@
+#pragma once
+// What a client draws its answers from: a server over the network, or a worker thread in process.
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/ids.h"
+#include "core/result.h"
+#include "core/view_cell.h"
+
+namespace ivis::client {
+
+/// Object sets by id, one bit each; bits past the last object are zero.
+using IdBits = std::vector<std::uint64_t>;
+inline std::size_t words_for(std::size_t objects) { return (objects + 63) / 64; }
+
+/// What is served: the same for as long as a client lives, but for the reach.
+struct Catalogue {
+  SceneHash scene_hash = 0;
+  std::string reach;
+  std::string method;
+  std::vector<std::uint32_t> node;      ///< by id
+  std::vector<std::uint32_t> instance;  ///< by id; (node, instance) ascends
+  std::uint32_t objects() const { return static_cast<std::uint32_t>(node.size()); }
+};
+
+/// Fails unless (node, instance) ascends strictly, which finding an id by them relies on.
+Status check_catalogue(const Catalogue& catalogue);
+
+/// The PVS of one pose.
+struct Answer {
+  std::uint32_t sequence = 0;  ///< of the pose; 0: no answer yet
+  ViewCell cell;
+  bool everything = false;     ///< every object is listed: true wherever the eye is; bits are empty
+  IdBits bits;
+  std::uint32_t count = 0;     ///< of bits set
+  double solve_ms = 0;
+};
+
+struct SourceStats {
+  std::uint64_t answers = 0;
+  std::uint64_t bytes = 0;
+  std::uint64_t reconnects = 0;
+  std::uint64_t bad_messages = 0;
+};
+
+/// Poses in, answers out. Threads: one caller at a time. No call blocks but wait().
+class PvsSource {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  virtual ~PvsSource() = default;
+
+  /// Null until the source knows what is served; then valid as long as the source.
+  virtual const Catalogue* catalogue() const = 0;
+  /// The latest pose replaces one that has not been sent. Sequences ascend from 1.
+  virtual void send(std::uint32_t sequence, const Vec3& eye) = 0;
+  /// Moves on whatever can be without waiting. Puts the newest answer into `answer` if there is one
+  /// that has not been taken (swapping buffers), and returns whether it did.
+  virtual bool receive(Answer& answer) = 0;
+  /// Blocks until something may have arrived, at most until `deadline`.
+  virtual void wait(Time deadline) = 0;
+  /// Has the other side been heard of lately?
+  virtual bool connected() const = 0;
+  /// Why no answer will ever come, or null.
+  virtual const Error* failure() const = 0;
+  /// Why none is coming at present, "" when all is well.
+  virtual std::string trouble() const = 0;
+  virtual SourceStats stats() const = 0;
+};
+
+}  // namespace ivis::client

@@ -1,0 +1,181 @@
+// ivisd: loads a scene, then serves what can be seen.
+
+#include <algorithm>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <iostream>
+#include <map>
+#include <optional>
+#include <string>
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+
+#include "server/config.h"
+#include "server/server.h"
+#include "server/world.h"
+
+namespace {
+
+using namespace ivis;
+using namespace ivis::server;
+
+enum Exit { kOk = 0, kUsage = 2, kInput = 3, kConnection = 4 };
+
+std::atomic<bool> stop_requested{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
+
+void request_stop(int) { stop_requested.store(true); }
+
+constexpr const char* kAbout =
+    "Serves visibility: tells each connected renderer which objects of a scene can be seen from anywhere\n"
+    "its observer can get to before the next answer.\n";
+constexpr const char* kMore =
+    "Example:\n"
+    "  ivis shrink city.glb --reach cylinder:1.5,0.1 -o city.ivo\n"
+    "  ivisd --scene city.glb --occluders city.ivo --listen tcp://127.0.0.1:7447 &\n"
+    "  ivis walk --connect tcp://127.0.0.1:7447 --path walk.csv\n"
+    "  kill %1        (bids its clients farewell and exits 0)\n"
+    "\n"
+    "Every option may also be a key of the --config file (log_level = \"debug\") or a variable of the\n"
+    "environment (IVISD_LOG_LEVEL=debug). A flag goes over the environment, that over the file.\n"
+    "Reach R, in metres: ball:r, disc:r, cylinder:r,h, ellipsoid:a,b,c or box:a,b,c; h, a, b, c are\n"
+    "half-extents.\n"
+    "Exit codes: 0 done, 2 usage, 3 bad scene, occluders or configuration, 4 address taken or unusable.\n";
+
+struct CommandLine {
+  std::map<std::string, std::string> given;
+  std::optional<std::filesystem::path> config;
+  bool check = false;
+};
+
+/// Exit code when the command line ends the program.
+std::optional<int> parse(int argc, char** argv, CommandLine& line) {
+  CLI::App app(kAbout, "ivisd");
+  app.footer(kMore);
+  app.get_formatter()->column_width(34);
+  std::map<std::string, std::string> values;
+  std::map<std::string, bool> switches;
+  std::map<std::string, CLI::Option*> options;
+  for (const ConfigKey& k : config_keys()) {
+    std::string flag = "--" + k.key;
+    std::replace(flag.begin(), flag.end(), '_', '-');
+    options[k.key] = k.form.empty() ? app.add_flag(flag, switches[k.key], k.help)
+                                    : app.add_option(flag, values[k.key], k.help)->type_name(k.form);
+  }
+  std::string config;
+  CLI::Option* config_option = app.add_option("--config", config, "TOML file of these options")->type_name("FILE");
+  app.add_flag("--check-config", line.check, "print the configuration and where each value comes from, and exit");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? kOk : kUsage;
+  }
+  for (const auto& [key, option] : options) {
+    if (option->count() == 0) continue;
+    const auto value = values.find(key);
+    line.given[key] = value != values.end() ? value->second : switches[key] ? "true" : "false";
+  }
+  if (config_option->count() != 0) line.config = config;
+  return std::nullopt;
+}
+
+int report(const Error& error) {
+  std::fprintf(stderr, "ivisd: %s\n", error.message.c_str());
+  return error.code == ErrorCode::kConnection ? kConnection : kInput;
+}
+
+/// A line that is redrawn on a terminal, and nothing elsewhere.
+Context shown_progress(Log& log) {
+  Context context;
+  context.stop = &stop_requested;
+  context.log = [&log](std::string_view text) { log.info("progress", {{"doing", text}}); };
+  if (isatty(STDERR_FILENO) != 0) {
+    context.progress = [](std::string_view stage, std::size_t done, std::size_t total) {
+      std::fprintf(stderr, "\r\x1b[K%.*s %zu/%zu%s", static_cast<int>(stage.size()), stage.data(), done, total,
+                   done >= total ? "\r\x1b[K" : "");
+    };
+  }
+  return context;
+}
+
+int check(const Configured& configured) {
+  std::cout << to_string(configured);
+  const Config& c = configured.config;
+  if (c.scene.empty()) return report(input_error("no scene: give --scene FILE"));
+  for (const auto& file : {c.scene, c.occluders}) {
+    std::error_code ec;
+    if (!file.empty() && !std::filesystem::is_regular_file(file, ec))
+      return report(input_error("'" + file.string() + "' is not a file"));
+  }
+  return kOk;
+}
+
+int serve(const Config& config) {
+  Log log(config.log_level, config.json_logs);
+  // Asked before the loading, which can take long, and again by the bind below.
+  if (auto free = probe_address(config.listen); !free) {
+    report(free.error());
+    return kConnection;
+  }
+  WorldOptions wanted;
+  wanted.scene = config.scene;
+  wanted.occluders = config.occluders;
+  wanted.reach = config.reach;
+  wanted.default_reach = kDefaultReach;
+  wanted.method = config.method;
+  wanted.threads = config.threads;
+  const Context context = shown_progress(log);
+  auto world = load_world(wanted, context);
+  if (!world) {
+    if (world.error().code == ErrorCode::kCancelled) return kOk;
+    return report(world.error());
+  }
+  const World& w = **world;
+  for (const std::string& warning : w.scene.warnings) log.warn("scene", {{"warning", warning}});
+  log.info("loaded", {{"scene", config.scene.string()}, {"objects", w.scene.object_count()},
+                      {"triangles", w.scene.triangle_count}, {"occluders", w.occluders.shrunk.size()},
+                      {"reach", w.reach.to_string()}, {"method", w.method->traits().name}});
+
+  const ServedScene served = served_scene(w.scene);
+  if (served.objects() > wire::kMaxMessageBytes / 12)
+    return report(input_error("'" + config.scene.string() + "' has " + std::to_string(served.objects()) +
+                              " objects, more than a message can name"));
+  ServerOptions options;
+  options.listen = config.listen;
+  options.busy_poll = config.busy_poll;
+  options.limits.max_sessions = config.max_clients;
+  options.limits.idle = std::chrono::seconds(config.idle_timeout_s);
+  auto server = Server::bind(options, served, *w.method, w.reach, log);
+  if (!server) {
+    report(server.error());
+    return kConnection;
+  }
+  log.info("listening", {{"address", (*server)->endpoint()}});
+  (*server)->run(stop_requested);
+  return kOk;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CommandLine line;
+  if (const auto code = parse(argc, argv, line)) return *code;
+  const auto configured = configure(line.given, process_environment(), line.config);
+  if (!configured) {
+    const int code = report(configured.error());
+    return configured.error().code == ErrorCode::kInvalidArgument ? kUsage : code;
+  }
+  if (line.check) return check(*configured);
+  if (configured->config.scene.empty()) {
+    std::fprintf(stderr, "ivisd: no scene: give --scene FILE (ivisd --help tells more)\n");
+    return kUsage;
+  }
+  struct sigaction action {};
+  action.sa_handler = request_stop;
+  sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGINT, &action, nullptr);
+  return serve(configured->config);
+}

@@ -1,0 +1,170 @@
+#include "server/server.h"
+
+#include <cerrno>
+#include <utility>
+
+#include <zmq.hpp>
+
+#include "server/address.h"
+
+namespace ivis::server {
+namespace {
+
+// Nothing a client sends is long; ZeroMQ drops a peer that sends more.
+constexpr std::int64_t kMaxIncomingBytes = 64 << 10;
+// Poses wait here for at most one solve; answers of a client that does not read are dropped beyond it.
+constexpr int kReceiveQueue = 256;
+constexpr int kSendQueue = 16;
+constexpr int kMaxDrained = 4096;
+constexpr auto kLookAtStop = std::chrono::milliseconds(100);
+constexpr auto kHousekeeping = std::chrono::seconds(1);
+
+Error explain(const zmq::error_t& e, const std::string& listen) {
+  if (e.num() == EADDRINUSE) return connection_error("another server already listens on " + listen);
+  if (e.num() == EINVAL || e.num() == EPROTONOSUPPORT || e.num() == ENODEV)
+    return invalid_argument("'" + listen + "' is not an address of this machine, expected tcp://HOST:PORT or ipc://PATH");
+  return connection_error("cannot listen on " + listen + ": " + e.what());
+}
+
+}  // namespace
+
+struct Server::Impl {
+  Impl(const ServerOptions& o, const ServedScene& scene, const Method& method, const Reach& reach, Log& l)
+      : options(o), log(l), sessions(scene, method, reach, o.limits), context(1),
+        socket(context, zmq::socket_type::router) {}
+
+  void configure() {
+    socket.set(zmq::sockopt::router_mandatory, true);
+    socket.set(zmq::sockopt::maxmsgsize, kMaxIncomingBytes);
+    socket.set(zmq::sockopt::rcvhwm, kReceiveQueue);
+    socket.set(zmq::sockopt::sndhwm, kSendQueue);
+    socket.set(zmq::sockopt::linger, 500);  // ms, for the farewells
+    socket.set(zmq::sockopt::heartbeat_ivl, 2000);
+    socket.set(zmq::sockopt::heartbeat_timeout, 10000);
+    socket.set(zmq::sockopt::ipv6, true);
+  }
+
+  /// Takes in what waits; a bound keeps a flood of messages from starving the answers.
+  void drain() {
+    zmq::message_t peer;
+    zmq::message_t body;
+    for (int i = 0; i < kMaxDrained; ++i) {
+      if (!socket.recv(peer, zmq::recv_flags::dontwait)) return;
+      bool more = peer.more();
+      bool one_body = more && static_cast<bool>(socket.recv(body, zmq::recv_flags::none)) && !body.more();
+      if (more && !one_body) {
+        zmq::message_t rest;
+        do static_cast<void>(socket.recv(rest, zmq::recv_flags::none)); while (rest.more());
+      }
+      const std::span<const std::byte> bytes(static_cast<const std::byte*>(body.data()),
+                                             one_body ? body.size() : 0);
+      const auto before = sessions.counters().malformed;
+      if (auto reply = sessions.receive(peer.to_string_view(), bytes, std::chrono::steady_clock::now()))
+        send(*reply);
+      if (sessions.counters().malformed != before)
+        log.warn("malformed_message", {{"bytes", bytes.size()}, {"total", before + 1}});
+    }
+  }
+
+  /// Never waits: what a full pipe or a vanished peer does not take is dropped, which the
+  /// acknowledgements make harmless.
+  void send(const Outgoing& out) {
+    try {
+      if (!socket.send(zmq::buffer(out.peer), zmq::send_flags::sndmore | zmq::send_flags::dontwait)) {
+        ++dropped;
+        return;
+      }
+      static_cast<void>(socket.send(zmq::buffer(out.bytes), zmq::send_flags::dontwait));
+    } catch (const zmq::error_t& e) {
+      if (e.num() != EHOSTUNREACH) throw;
+      sessions.forget(out.peer);
+      log.info("client_gone", {{"clients", sessions.size()}});
+    }
+  }
+
+  void turn() {
+    const bool spin = sessions.work_waiting() || options.busy_poll;
+    zmq::pollitem_t item{socket.handle(), 0, ZMQ_POLLIN, 0};
+    if (!spin) zmq::poll(&item, 1, kLookAtStop);
+    drain();
+    const auto welcomed = sessions.counters().welcomed;
+    if (const auto out = sessions.work()) {
+      send(*out);
+      if (sessions.counters().welcomed != welcomed)
+        log.info("client_welcome", {{"clients", sessions.size()}, {"bytes", out->bytes.size()}});
+    }
+    const auto now = std::chrono::steady_clock::now();
+    if (now >= next_housekeeping) {
+      next_housekeeping = now + kHousekeeping;
+      if (const auto gone = sessions.expire(now); gone != 0)
+        log.info("clients_expired", {{"expired", gone}, {"clients", sessions.size()}});
+    }
+  }
+
+  ServerOptions options;
+  Log& log;
+  SessionTable sessions;
+  std::string endpoint;
+  std::uint64_t dropped = 0;
+  SessionTable::Time next_housekeeping{};
+  zmq::context_t context;
+  zmq::socket_t socket;
+};
+
+Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Server::~Server() = default;
+const std::string& Server::endpoint() const { return impl_->endpoint; }
+const SessionCounters& Server::counters() const { return impl_->sessions.counters(); }
+
+Result<std::unique_ptr<Server>> Server::bind(const ServerOptions& options, const ServedScene& scene,
+                                             const Method& method, const Reach& reach, Log& log) {
+  if (auto claimed = claim_address(options.listen); !claimed) return claimed.error();
+  try {
+    auto impl = std::make_unique<Impl>(options, scene, method, reach, log);
+    impl->configure();
+    impl->socket.bind(options.listen);
+    impl->endpoint = impl->socket.get(zmq::sockopt::last_endpoint);
+    return std::unique_ptr<Server>(new Server(std::move(impl)));
+  } catch (const zmq::error_t& e) {
+    return explain(e, options.listen);
+  }
+}
+
+Status probe_address(const std::string& listen) {
+  if (auto claimed = claim_address(listen); !claimed) return claimed;
+  try {
+    zmq::context_t context(1);
+    zmq::socket_t socket(context, zmq::socket_type::router);
+    socket.set(zmq::sockopt::linger, 0);
+    socket.set(zmq::sockopt::ipv6, true);
+    socket.bind(listen);
+    return ok();
+  } catch (const zmq::error_t& e) {
+    return explain(e, listen);
+  }
+}
+
+void Server::run(const std::atomic<bool>& stop) {
+  Impl& s = *impl_;
+  while (!stop.load(std::memory_order_relaxed)) {
+    try {
+      s.turn();
+    } catch (const zmq::error_t& e) {
+      if (e.num() == EINTR) continue;  // a signal: look at `stop`
+      s.log.error("socket_failed", {{"reason", e.what()}});
+      break;
+    }
+  }
+  try {
+    for (const Outgoing& farewell : s.sessions.close()) s.send(farewell);
+    s.socket.close();
+  } catch (const zmq::error_t& e) {
+    s.log.warn("farewell_failed", {{"reason", e.what()}});
+  }
+  const SessionCounters& c = s.sessions.counters();
+  s.log.info("closed", {{"welcomed", c.welcomed}, {"poses", c.poses}, {"answers", c.answers},
+                        {"superseded", c.superseded}, {"refused", c.refused},
+                        {"malformed", c.malformed}, {"dropped", s.dropped}, {"bytes_out", c.bytes_out}});
+}
+
+}  // namespace ivis::server

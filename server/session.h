@@ -1,0 +1,131 @@
+#pragma once
+// What the server knows of its clients. No sockets: messages in, messages out.
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <random>
+#include <span>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "core/reach.h"
+#include "scenes/scene.h"
+#include "visibility/method.h"
+#include "wire/messages.h"
+#include "wire/pvs_codec.h"
+
+namespace ivis::server {
+
+/// What clients are told of a scene, made once. Threads: a value.
+struct ServedScene {
+  SceneHash hash = 0;
+  std::uint64_t order_hash = 0;
+  wire::ObjectTable table;    ///< by rank
+  std::vector<Rank> rank_of;  ///< by id
+  std::uint32_t objects() const { return static_cast<std::uint32_t>(rank_of.size()); }
+};
+
+ServedScene served_scene(const Scene& scene);
+
+struct SessionLimits {
+  std::size_t max_sessions = 256;
+  std::chrono::milliseconds idle{60'000};  ///< silence after which a session is over
+  std::size_t remembered_sets = 32;        ///< PVS a session that may become a base
+  std::size_t remembered_bytes = 4U << 20U;  ///< of them; at least two are kept whatever their size
+};
+
+struct SessionCounters {
+  std::uint64_t welcomed = 0;
+  std::uint64_t refused = 0;
+  std::uint64_t malformed = 0;
+  std::uint64_t expired = 0;
+  std::uint64_t poses = 0;
+  std::uint64_t superseded = 0;  ///< poses that a later one overtook before their turn
+  std::uint64_t answers = 0;
+  std::uint64_t full_sets = 0;
+  std::uint64_t solve_errors = 0;
+  std::uint64_t bytes_out = 0;  ///< of answers
+};
+
+/// A message and the peer it goes to.
+struct Outgoing {
+  std::string peer;
+  std::vector<std::byte> bytes;
+};
+
+/// The sessions of one server: takes messages in with receive(), hands out work a client at a time with
+/// work(). A later pose of a client replaces its earlier one; clients with something to answer take
+/// turns. An answer is coded against the newest PVS the client has acknowledged, so that any message
+/// may be lost.
+/// Threads:   one thread at a time.
+/// Ownership: borrows scene and method.
+/// Limits:    max_sessions, and per session remembered_bytes of sets; a full table refuses with kBusy.
+class SessionTable {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+
+  /// `reach`: of a client that wants none of its own, and the largest one that may be asked for.
+  SessionTable(const ServedScene& scene, const Method& method, const Reach& reach, SessionLimits limits);
+
+  /// Takes one message of `peer`; never fails: what is wrong comes back as a Refused to send.
+  std::optional<Outgoing> receive(std::string_view peer, std::span<const std::byte> bytes, Time now);
+
+  bool work_waiting() const { return !turn_.empty(); }
+  /// Answers the next client in turn. Cost: one solve and one encoding.
+  std::optional<Outgoing> work();
+
+  /// The transport says that this peer is gone.
+  void forget(std::string_view peer);
+  /// Ends sessions that said nothing for limits.idle. Returns how many.
+  std::size_t expire(Time now);
+  /// A farewell to every client; no session is left.
+  std::vector<Outgoing> close();
+
+  std::size_t size() const { return sessions_.size(); }
+  const SessionCounters& counters() const { return counters_; }
+
+ private:
+  struct Remembered {
+    std::uint32_t sequence;
+    wire::PvsState state;
+  };
+  struct Session {
+    std::uint64_t id = 0;
+    Reach reach;
+    Time heard{};
+    bool welcome_due = false;
+    bool table_wanted = false;
+    bool in_turn = false;
+    std::uint32_t last_sequence = 0;  ///< of poses received
+    std::uint32_t acknowledged = 0;   ///< sequence of the PVS the client holds
+    std::optional<wire::PoseMessage> pose;
+    std::deque<Remembered> sent;  ///< ascending sequence
+  };
+
+  std::optional<Outgoing> handle(std::string_view peer, const wire::Hello& hello, Time now);
+  std::optional<Outgoing> handle(std::string_view peer, const wire::PoseMessage& pose, Time now);
+  std::optional<Outgoing> handle(std::string_view peer, const wire::Bye& bye);
+  Outgoing refuse(std::string_view peer, std::uint64_t session, wire::Refusal reason, std::string text);
+  std::vector<std::byte> welcome(Session& session);
+  std::vector<std::byte> answer(Session& session);
+  void remember(Session& session, std::uint32_t sequence, wire::PvsState state);
+  void enqueue(std::string_view peer, Session& session);
+  std::size_t remembered_limit() const;
+
+  const ServedScene& scene_;
+  const Method& method_;
+  Reach reach_;
+  SessionLimits limits_;
+  SessionCounters counters_;
+  std::unordered_map<std::string, Session> sessions_;  ///< by peer
+  std::deque<std::string> turn_;                       ///< peers with something to answer
+  std::mt19937_64 ids_;
+  const wire::PvsState nothing_;
+};
+
+}  // namespace ivis::server

@@ -1,0 +1,67 @@
+#include "server/world.h"
+
+#include <utility>
+
+#include "occluders/fast_erosion.h"
+#include "occluders/file.h"
+#include "occluders/shrink.h"
+#include "scenes/load.h"
+
+namespace ivis::server {
+namespace {
+
+Result<OccluderSet> shrink_here(const Scene& scene, const Reach& reach, const Context& context) {
+  ShrinkOptions options;
+  options.reach = reach;
+  const FastEroder eroder;
+  auto shrunk = shrink(scene, options, eroder, context);
+  if (!shrunk) return shrunk.error();
+  return std::move(shrunk->set);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<World>> load_world(const WorldOptions& options, const Context& context) {
+  auto world = std::make_unique<World>();
+  context.say("loading " + options.scene.string());
+  auto scene = load_scene(options.scene, {}, context);
+  if (!scene) return scene.error();
+  world->scene = std::move(*scene);
+
+  if (!options.occluders.empty()) {
+    auto set = read_occluders(options.occluders);
+    if (!set) return set.error();
+    world->occluders = std::move(*set);
+  }
+  std::string text = options.reach;
+  if (text.empty()) text = options.occluders.empty() ? options.default_reach : world->occluders.reach.to_string();
+  auto reach = Reach::parse(text);
+  if (!reach) return reach.error();
+  world->reach = *reach;
+
+  if (options.occluders.empty()) {
+    context.say("shrinking occluders by " + text);
+    auto set = shrink_here(world->scene, world->reach, context);
+    if (!set) return set.error();
+    world->occluders = std::move(*set);
+  } else if (auto fits = check_occluders(world->occluders, world->scene.hash, world->reach,
+                                         options.occluders.string());
+             !fits) {
+    return fits.error();
+  }
+
+  std::string method = options.method;
+  if (method.empty()) {
+    const auto list = method_list();
+    IVIS_ASSERT(!list.empty(), "at least one method is registered");
+    method = list.front().name;
+  }
+  MethodOptions method_options;
+  method_options.threads = options.threads;
+  auto made = make_method(method, world->scene, world->occluders, method_options);
+  if (!made) return made.error();
+  world->method = std::move(*made);
+  return world;
+}
+
+}  // namespace ivis::server

@@ -1,0 +1,328 @@
+#include "server/session.h"
+
+#include <algorithm>
+#include <map>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "tests/server/fake_method.h"
+
+namespace ivis::test {
+namespace {
+
+using namespace std::chrono_literals;
+using server::SessionTable;
+using wire::Refusal;
+
+/// A client's side of the conversation, without a client.
+struct Peer {
+  std::string name;
+  std::uint64_t session = 0;
+  std::vector<std::uint32_t> id_of;
+  std::map<std::uint32_t, wire::PvsState> states;
+};
+
+class Sessions : public ::testing::Test {
+ protected:
+  Scene scene = grid_scene(12);
+  NearMethod method{scene};
+  server::ServedScene served = server::served_scene(scene);
+  server::SessionLimits limits;
+  SessionTable::Time now{};
+  std::unique_ptr<SessionTable> table_;
+
+  SessionTable& table() {
+    if (!table_) table_ = std::make_unique<SessionTable>(served, method, Reach::disc(2), limits);
+    return *table_;
+  }
+  std::optional<wire::Message> say(const Peer& peer, const wire::Message& m) {
+    auto out = table().receive(peer.name, wire::encode(m), now);
+    return out ? std::optional(decoded(*out, peer.name)) : std::nullopt;
+  }
+  static wire::Message decoded(const server::Outgoing& out, const std::string& peer) {
+    EXPECT_EQ(out.peer, peer);
+    auto m = wire::decode(out.bytes);
+    EXPECT_TRUE(m) << (m ? "" : m.error().message);
+    return m ? *m : wire::Message(wire::Bye{});
+  }
+  Peer greet(const std::string& name) {
+    Peer peer{name, 0, {}, {}};
+    EXPECT_FALSE(say(peer, wire::Hello{}));
+    const auto out = table().work();
+    EXPECT_TRUE(out);
+    const auto welcome = std::get<wire::Welcome>(decoded(*out, name));
+    peer.session = welcome.session;
+    peer.id_of = welcome.table.id;
+    return peer;
+  }
+  std::optional<wire::Message> pose(const Peer& peer, std::uint32_t sequence, const Vec3& eye, std::uint32_t have = 0) {
+    return say(peer, wire::PoseMessage{peer.session, sequence, have, eye});
+  }
+  /// The next message of the server, which must be a PVS for `peer`.
+  wire::PvsMessage next_pvs(const Peer& peer) {
+    const auto out = table().work();
+    EXPECT_TRUE(out);
+    if (!out) return {};
+    const auto m = decoded(*out, peer.name);
+    EXPECT_TRUE(std::holds_alternative<wire::PvsMessage>(m));
+    return std::get<wire::PvsMessage>(m);
+  }
+  std::vector<ObjectId> ids(Peer& peer, const wire::PvsMessage& m) {
+    const wire::PvsState base = m.base == 0 ? wire::PvsState(served.objects()) : peer.states.at(m.base);
+    auto state = wire::decode_pvs(m.payload, base);
+    EXPECT_TRUE(state);
+    std::vector<ObjectId> out;
+    for (Rank r = 0; r < served.objects(); ++r)
+      if (state->set.test(r)) out.push_back(peer.id_of[r]);
+    std::sort(out.begin(), out.end());
+    peer.states.insert_or_assign(m.sequence, *state);
+    return out;
+  }
+  std::vector<ObjectId> truth(const Vec3& eye) { return method.solve({eye, Reach::disc(2)})->objects; }
+  static Refusal reason(const std::optional<wire::Message>& m) {
+    const auto* refused = m ? std::get_if<wire::Refused>(&*m) : nullptr;
+    EXPECT_NE(refused, nullptr);
+    return refused != nullptr ? refused->reason : Refusal{};
+  }
+};
+
+TEST_F(Sessions, WelcomeNamesEveryObject) {
+  Peer peer{"a", 0, {}, {}};
+  say(peer, wire::Hello{});
+  const auto w = std::get<wire::Welcome>(decoded(*table().work(), "a"));
+  EXPECT_EQ(w.scene_hash, scene.hash);
+  EXPECT_EQ(w.objects, scene.object_count());
+  EXPECT_EQ(w.reach, "disc:2");
+  EXPECT_NE(w.session, 0U);
+  ASSERT_EQ(w.table.id.size(), scene.object_count());
+  for (Rank r = 0; r < w.objects; ++r) EXPECT_EQ(w.table.node[r], scene.objects[w.table.id[r]].node);
+}
+
+TEST_F(Sessions, FirstAnswerIsFullAndLaterOnesDiffer) {
+  Peer a = greet("a");
+  pose(a, 1, {4, 1, 4});
+  const auto first = next_pvs(a);
+  EXPECT_EQ(first.base, 0U);
+  EXPECT_EQ(ids(a, first), truth({4, 1, 4}));
+  pose(a, 2, {5, 1, 4}, 1);
+  const auto second = next_pvs(a);
+  EXPECT_EQ(second.base, 1U);
+  EXPECT_EQ(ids(a, second), truth({5, 1, 4}));
+  EXPECT_LT(second.payload.size(), first.payload.size());
+}
+
+TEST_F(Sessions, AnswersAgainstTheAcknowledgedSetWhenAnswersAreLost) {
+  Peer a = greet("a");
+  pose(a, 1, {4, 1, 4});
+  ids(a, next_pvs(a));
+  for (std::uint32_t s = 2; s < 6; ++s) {  // none of these arrives
+    pose(a, s, {4.0 + s, 1, 4}, 1);
+    EXPECT_EQ(next_pvs(a).base, 1U);
+  }
+  pose(a, 6, {12, 1, 4}, 1);
+  const auto m = next_pvs(a);
+  EXPECT_EQ(m.base, 1U);
+  EXPECT_EQ(ids(a, m), truth({12, 1, 4}));
+}
+
+TEST_F(Sessions, AcknowledgedSetOutlivesAFullMemory) {
+  limits.remembered_sets = 4;
+  Peer a = greet("a");
+  pose(a, 1, {4, 1, 4});
+  ids(a, next_pvs(a));
+  for (std::uint32_t s = 2; s < 40; ++s) {
+    pose(a, s, {4.0 + s % 9, 1, 4}, 1);
+    const auto m = next_pvs(a);
+    ASSERT_EQ(m.base, 1U);
+  }
+  pose(a, 40, {9, 1, 4}, 20);  // long forgotten
+  const auto m = next_pvs(a);
+  EXPECT_EQ(m.base, 0U);
+  EXPECT_EQ(ids(a, m), truth({9, 1, 4}));
+}
+
+TEST_F(Sessions, LatestPoseWins) {
+  Peer a = greet("a");
+  const int solves = method.solves;
+  for (std::uint32_t s = 1; s <= 10; ++s) pose(a, s, {1.0 * s, 1, 4});
+  EXPECT_EQ(next_pvs(a).sequence, 10U);
+  EXPECT_EQ(method.solves, solves + 1);
+  EXPECT_FALSE(table().work());
+  EXPECT_EQ(table().counters().superseded, 9U);
+}
+
+TEST_F(Sessions, APoseIsNotAnsweredTwice) {
+  Peer a = greet("a");
+  pose(a, 5, {4, 1, 4});
+  next_pvs(a);
+  pose(a, 5, {4, 1, 4});
+  pose(a, 4, {4, 1, 4});
+  EXPECT_FALSE(table().work_waiting());
+}
+
+TEST_F(Sessions, ClientsTakeTurns) {
+  Peer a = greet("a");
+  Peer b = greet("b");
+  Peer c = greet("c");
+  std::uint32_t s = 0;
+  for (const Peer* p : {&a, &b, &c}) pose(*p, 1, {4, 1, 4});
+  for (int round = 0; round < 3; ++round) {
+    for (const Peer* p : {&a, &b, &c}) {
+      next_pvs(*p);
+      pose(*p, 2 + s++, {4, 1, 4});  // asks again at once, and still waits for the others
+    }
+  }
+}
+
+TEST_F(Sessions, UnsolvablePoseIsAnsweredWithEverything) {
+  Peer a = greet("a");
+  pose(a, 1, {4, -60, 4});
+  EXPECT_TRUE(next_pvs(a).everything);
+  EXPECT_EQ(table().counters().solve_errors, 1U);
+  pose(a, 2, {4, 60, 4});
+  EXPECT_TRUE(next_pvs(a).everything);
+  pose(a, 3, {4, 1, 4}, 0);
+  EXPECT_EQ(ids(a, next_pvs(a)), truth({4, 1, 4}));
+}
+
+TEST_F(Sessions, RefusesUnknownSession) {
+  EXPECT_EQ(reason(say({"x", 0, {}, {}}, wire::PoseMessage{77, 1, 0, {}})), Refusal::kSession);
+  Peer a = greet("a");
+  EXPECT_EQ(reason(say({"b", 0, {}, {}}, wire::PoseMessage{a.session, 1, 0, {}})), Refusal::kSession)
+      << "a session belongs to the peer that began it";
+  EXPECT_EQ(reason(say(a, wire::PoseMessage{a.session + 1, 1, 0, {}})), Refusal::kSession);
+  EXPECT_FALSE(table().work_waiting());
+}
+
+TEST_F(Sessions, RefusesAnotherSceneNamingBothHashes) {
+  wire::Hello hello;
+  hello.scene_hash = 0x1234;
+  const auto m = say({"a", 0, {}, {}}, hello);
+  ASSERT_EQ(reason(m), Refusal::kScene);
+  const std::string text = std::get<wire::Refused>(*m).text;
+  EXPECT_NE(text.find("0000000000001234"), std::string::npos) << text;
+  char own[20];
+  std::snprintf(own, sizeof own, "%016llx", static_cast<unsigned long long>(scene.hash));
+  EXPECT_NE(text.find(own), std::string::npos) << text;
+}
+
+TEST_F(Sessions, RefusesAnotherVersion) {
+  wire::Hello hello;
+  hello.version = 99;
+  EXPECT_EQ(reason(say({"a", 0, {}, {}}, hello)), Refusal::kVersion);
+}
+
+TEST_F(Sessions, ServesASmallerReachAndRefusesALargerOne) {
+  wire::Hello hello;
+  hello.reach = "disc:1";
+  EXPECT_FALSE(say({"a", 0, {}, {}}, hello));
+  EXPECT_EQ(std::get<wire::Welcome>(decoded(*table().work(), "a")).reach, "disc:1");
+  hello.reach = "disc:2.1";
+  EXPECT_EQ(reason(say({"a", 0, {}, {}}, hello)), Refusal::kReach);
+  hello.reach = "ball:1";  // reaches up, where the disc does not
+  EXPECT_EQ(reason(say({"a", 0, {}, {}}, hello)), Refusal::kReach);
+  hello.reach = "nonsense";
+  EXPECT_EQ(reason(say({"a", 0, {}, {}}, hello)), Refusal::kReach);
+}
+
+TEST_F(Sessions, GarbageIsRefusedAndCountedAndEndsNothing) {
+  Peer a = greet("a");
+  std::mt19937 random(7);
+  for (int i = 0; i < 2000; ++i) {
+    std::vector<std::byte> bytes(random() % 200);
+    for (auto& b : bytes) b = static_cast<std::byte>(random());
+    table().receive(i % 2 == 0 ? "a" : "evil", bytes, now);
+  }
+  EXPECT_EQ(table().counters().malformed, 2000U);
+  EXPECT_EQ(table().size(), 1U);
+  pose(a, 1, {4, 1, 4});
+  EXPECT_EQ(ids(a, next_pvs(a)), truth({4, 1, 4}));
+}
+
+TEST_F(Sessions, DamagedMessagesNeverCrash) {
+  const Peer a = greet("a");
+  std::mt19937 random(11);
+  wire::Hello hello;
+  hello.reach = "disc:1";
+  for (const wire::Message& m : {wire::Message(hello), wire::Message(wire::PoseMessage{a.session, 1, 0, {4, 1, 4}}),
+                                 wire::Message(wire::Bye{a.session})}) {
+    const auto sound = wire::encode(m);
+    for (int i = 0; i < 3000; ++i) {
+      auto bytes = sound;
+      bytes[random() % bytes.size()] ^= static_cast<std::byte>(1U << (random() % 8));
+      if (i % 3 == 0) bytes.resize(random() % bytes.size());
+      table().receive("evil" + std::to_string(i % 5), bytes, now);
+      table().work();
+    }
+  }
+  EXPECT_LE(table().size(), 6U);
+}
+
+TEST_F(Sessions, RefusesMessagesThatOnlyAServerSends) {
+  EXPECT_EQ(reason(say({"a", 0, {}, {}}, wire::PvsMessage{})), Refusal::kMalformed);
+  EXPECT_EQ(reason(say({"a", 0, {}, {}}, wire::Refused{})), Refusal::kMalformed);
+}
+
+TEST_F(Sessions, RefusesAPoseWithoutSequence) {
+  const Peer a = greet("a");
+  EXPECT_EQ(reason(pose(a, 0, {4, 1, 4})), Refusal::kMalformed);
+  EXPECT_EQ(table().size(), 0U);
+}
+
+TEST_F(Sessions, TakesNoMoreThanItsLimit) {
+  limits.max_sessions = 3;
+  for (const char* name : {"a", "b", "c"}) greet(name);
+  EXPECT_EQ(reason(say({"d", 0, {}, {}}, wire::Hello{})), Refusal::kBusy);
+  greet("b");  // a known peer may greet again
+  EXPECT_EQ(table().size(), 3U);
+}
+
+TEST_F(Sessions, ExpireWhenSilentOnly) {
+  limits.idle = 10s;
+  const Peer a = greet("a");
+  greet("b");
+  now += 6s;
+  pose(a, 1, {4, 1, 4});
+  now += 6s;
+  EXPECT_EQ(table().expire(now), 1U);
+  EXPECT_EQ(table().size(), 1U);
+  EXPECT_EQ(next_pvs(a).sequence, 1U);
+  EXPECT_EQ(reason(say({"b", 0, {}, {}}, wire::PoseMessage{1, 1, 0, {}})), Refusal::kSession);
+}
+
+TEST_F(Sessions, HelloAgainBeginsANewSession) {
+  const Peer a = greet("a");
+  pose(a, 1, {4, 1, 4});
+  const Peer again = greet("a");
+  EXPECT_NE(a.session, again.session);
+  EXPECT_FALSE(table().work()) << "the pose was of the old session";
+  EXPECT_EQ(reason(pose(a, 2, {4, 1, 4})), Refusal::kSession);
+  pose(again, 1, {4, 1, 4}, 1);
+  EXPECT_EQ(next_pvs(again).base, 0U) << "a new session remembers no sets";
+}
+
+TEST_F(Sessions, ByeAndCloseEndSessions) {
+  const Peer a = greet("a");
+  greet("b");
+  say({"b", 0, {}, {}}, wire::Bye{a.session});
+  EXPECT_EQ(table().size(), 2U) << "another's session";
+  say(a, wire::Bye{a.session});
+  EXPECT_EQ(table().size(), 1U);
+  const auto farewells = table().close();
+  ASSERT_EQ(farewells.size(), 1U);
+  EXPECT_EQ(reason(decoded(farewells[0], "b")), Refusal::kClosing);
+  EXPECT_EQ(table().size(), 0U);
+}
+
+TEST_F(Sessions, AFloodOfGreetingsStaysWithinBounds) {
+  limits.max_sessions = 4;
+  for (int i = 0; i < 1000; ++i) say({std::to_string(i), 0, {}, {}}, wire::Hello{});
+  for (int i = 0; i < 1000; ++i) say({"0", 0, {}, {}}, wire::Hello{});
+  int answered = 0;
+  while (table().work()) ++answered;
+  EXPECT_EQ(answered, 4);
+}
+
+}  // namespace
+}  // namespace ivis::test
