@@ -26,6 +26,8 @@ int main(int argc, char** argv) {
   add_pvs(app, action);
   add_verify(app, action);
   add_draw(app, action);
+  add_walk(app, action);
+  add_generate(app, action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -3,6 +3,7 @@
 #include <iostream>
 #include <memory>
 
+#include "occluders/exact/exact_erosion.h"
 #include "occluders/fast_erosion.h"
 #include "occluders/file.h"
 #include "tools/common.h"
@@ -32,7 +33,12 @@ Outcome run(const Args& args) {
   options.view_space = *space;
   const auto scene = args.scene.load(context);
   if (!scene) return scene.error();
-  const auto eroder = make_eroder(args.builder);
+  std::unique_ptr<Eroder> eroder;
+  if (args.builder == "exact") {
+    eroder = std::make_unique<ExactEroder>();
+  } else {
+    eroder = std::make_unique<FastEroder>();
+  }
   const auto shrunk = shrink(*scene, options, *eroder, context);
   if (!shrunk) return shrunk.error();
   if (auto s = write_occluders(args.out, shrunk->set); !s) return s.error();
