@@ -1,6 +1,7 @@
 #include "visibility/method.h"
 
 #include "visibility/cull_map.h"
+#include "visibility/reference.h"
 
 namespace ivis {
 
@@ -26,6 +27,7 @@ const std::vector<Entry>& entries() {
        [](const Scene& s, const OccluderSet& o, const MethodOptions& m) -> std::unique_ptr<Method> {
          return std::make_unique<CullMap>(s, o, m);
        }},
+      {reference_traits(), make_reference},
   };
   return all;
 }
