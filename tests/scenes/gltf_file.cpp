@@ -99,6 +99,9 @@ GltfFolder::~GltfFolder() {
 
 std::filesystem::path GltfFolder::write(const std::string& name, const std::string& bytes) const {
   const auto file = folder_ / name;
+  std::error_code ignored;
+  std::filesystem::remove(
+      file, ignored);  // some file systems flush a file that is truncated and rewritten
   std::ofstream(file, std::ios::binary)
       .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   return file;
