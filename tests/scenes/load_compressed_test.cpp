@@ -359,7 +359,7 @@ void expect_no_crash(const std::string& bytes,
   const auto random = [&] {
     return (state = state * 6364136223846793005ULL + 1442695040888963407ULL) >> 33U;
   };
-  for (int k = 0; k < 600; ++k) {
+  for (int k = 0; k < 3000; ++k) {
     std::string broken = bytes;
     for (std::uint64_t flips = 1 + random() % 3; flips > 0; --flips)
       broken[random() % broken.size()] ^= static_cast<char>(1U << (random() % 8));
