@@ -180,8 +180,8 @@ Result<std::string> move_draco_indices(const std::string& text) {
       continue;
     for (json& primitive : mesh["primitives"]) {
       const json* extensions = member(primitive, "extensions");
-      if (extensions == nullptr || member(*extensions, "KHR_draco_mesh_compression") == nullptr)
-        continue;
+      const json* draco = extensions ? member(*extensions, "KHR_draco_mesh_compression") : nullptr;
+      if (draco == nullptr || !draco->is_object()) continue;
       const json* attributes = member(primitive, "attributes");
       if (attributes == nullptr || !attributes->is_object() || !primitive.contains("indices"))
         continue;

@@ -138,7 +138,7 @@ Status GltfMeshReader::add_primitive(const tinygltf::Primitive& primitive, Mesh&
     epoch_accessor_ = position->second;
     if (placed_.size() < positions->count()) placed_.resize(positions->count());
   }
-  mesh.indices.reserve(mesh.indices.size() + 3 * triangles);
+  if (mesh.indices.empty()) mesh.indices.reserve(3 * triangles);
   for (std::size_t t = 0; t < triangles; ++t) {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t c = corner(mode, t, k);

@@ -60,12 +60,18 @@ Status check_mesh(const Mesh& mesh, std::size_t index) {
 struct Extent {
   Aabb box;
   Vec3 magnitude{0};
+  bool uses_all = false;  ///< there are no other vertices
 };
 
 Extent extent_of(const Mesh& mesh) {
   Extent e;
-  for (const std::uint32_t i : mesh.indices)
+  std::vector<bool> used(mesh.positions.size(), false);
+  for (const std::uint32_t i : mesh.indices) {
+    if (used[i]) continue;
+    used[i] = true;
     e.box.add(Vec3(mesh.positions[i]));
+  }
+  e.uses_all = std::find(used.begin(), used.end(), false) == used.end();
   if (!e.box.empty()) e.magnitude = glm::max(glm::abs(e.box.lo), glm::abs(e.box.hi));
   return e;
 }
@@ -96,16 +102,21 @@ class Bounds {
     // A file can ask for a million instances of a mesh of a million triangles. When that gets out
     // of hand, the transformed corners of the mesh's box do: a larger box is seen sooner, never
     // later.
-    const bool corners = maps_boxes_to_boxes(m) || vertices_left_ < mesh.indices.size();
+    const std::size_t work = extent.uses_all ? mesh.positions.size() : mesh.indices.size();
+    const bool corners = maps_boxes_to_boxes(m) || vertices_left_ < work;
     if (corners) {
       for (unsigned c = 0; c < 8; ++c)
         box.add(world(m, {(c & 1U) != 0 ? extent.box.hi.x : extent.box.lo.x,
                           (c & 2U) != 0 ? extent.box.hi.y : extent.box.lo.y,
                           (c & 4U) != 0 ? extent.box.hi.z : extent.box.lo.z}));
     } else {
-      vertices_left_ -= mesh.indices.size();
-      for (const std::uint32_t i : mesh.indices)
-        box.add(world(m, Vec3(mesh.positions[i])));
+      vertices_left_ -= work;
+      if (extent.uses_all)
+        for (const auto& p : mesh.positions)
+          box.add(world(m, Vec3(p)));
+      else
+        for (const std::uint32_t i : mesh.indices)
+          box.add(world(m, Vec3(mesh.positions[i])));
     }
     // The terms of the sum may be far larger than the sum.
     Vec3 terms = glm::abs(origin);
@@ -120,7 +131,7 @@ class Bounds {
 
   const Scene& scene_;
   std::vector<Extent> extents_;
-  std::size_t vertices_left_ = std::size_t{1} << 30U;
+  std::size_t vertices_left_ = std::size_t{1} << 28U;
 };
 
 class Hasher {
