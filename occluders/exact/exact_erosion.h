@@ -1,16 +1,17 @@
 #pragma once
-// Target ivis::occluders_exact. It links CGAL's Minkowski sums and boolean operations: a binary that
-// links it is under GPL-3+, though this source is Apache-2.0. Neither the daemon nor the client does.
+// Target ivis::occluders_exact. It links CGAL's Minkowski sums and boolean operations: a binary
+// that links it is under GPL-3+, though this source is Apache-2.0. Neither the daemon nor the
+// client does.
 
 #include "occluders/shrink.h"
 
 namespace ivis {
 
-/// Erosion in exact rational arithmetic: the Minkowski sum of the polygon's bounded complement with a
-/// polygon that circumscribes the reach, taken away from the polygon.
-/// Guarantee: the result lies inside the true erosion by 1e-6 m or more, so rounding to double is paid
-///            for. For a box reach it is that box's erosion; for an ellipse the k-gon's, whose sides
-///            overstep by a factor of at most 1 / cos(pi / k).
+/// Erosion in exact rational arithmetic: the Minkowski sum of the polygon's bounded complement with
+/// a polygon that circumscribes the reach, taken away from the polygon. Guarantee: the result lies
+/// inside the true erosion by 1e-6 m or more, so rounding to double is paid
+///            for. For a box reach it is that box's erosion; for an ellipse the k-gon's, whose
+///            sides overstep by a factor of at most 1 / cos(pi / k).
 /// Errors:    none; a polygon that CGAL refuses comes back empty.
 /// Threads:   const and reentrant.
 /// Cost:      seconds for 1,500 footprints; bench/erosion_bench.cpp

@@ -1,0 +1,4 @@
+#include "occluders/ground.h"
+
+#include <gtest/gtest.h>
+TEST(Ground, Stub) {}
