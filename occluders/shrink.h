@@ -22,11 +22,11 @@ class Eroder {
 };
 
 struct ShrinkReport {
-  std::size_t occluders_in = 0;   ///< objects considered
-  std::size_t occluders_out = 0;  ///< shrunk prisms
+  std::size_t occluders_in = 0;                 ///< objects considered
+  std::size_t occluders_out = 0;                ///< shrunk prisms
   std::map<std::string, std::size_t> left_out;  ///< reason -> objects (or pieces)
-  double solid_volume = 0;   ///< cubic metres, real solids, without extensions
-  double kept_volume = 0;    ///< of the shrunk prisms, without extensions
+  double solid_volume = 0;                      ///< cubic metres, real solids, without extensions
+  double kept_volume = 0;                       ///< of the shrunk prisms, without extensions
   double seconds = 0;
   double volume_kept() const { return solid_volume > 0 ? kept_volume / solid_volume : 0; }
 };
@@ -41,9 +41,10 @@ struct Shrunk {
   ShrinkReport report;
 };
 
-/// Scene -> solids (prisms.h) -> fused per height level (fuse.h) -> eroded -> gated by an independent
-/// distance check. Errors: kInvalidArgument when a seed of the view space lies in a solid; kCancelled.
-/// Threads: reentrant; uses context.threads; the result does not depend on their number.
+/// Scene -> solids (prisms.h) -> fused per height level (fuse.h) -> eroded -> gated by an
+/// independent distance check. Errors: kInvalidArgument when a seed of the view space lies in a
+/// solid; kCancelled. Threads: reentrant; uses context.threads; the result does not depend on their
+/// number.
 Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Eroder& eroder,
                       const Context& context = {});
 

@@ -1,0 +1,236 @@
+#include "occluders/shrink.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <mutex>
+
+#include "core/view_cell.h"
+#include "occluders/clip.h"
+#include "occluders/distance_check.h"
+#include "occluders/fuse.h"
+#include "occluders/ground.h"
+#include "occluders/prisms.h"
+
+namespace ivis {
+namespace {
+
+/// Cheap, thread-safe progress: reports about a hundred times a stage.
+class Progress {
+ public:
+  Progress(const Context& context, const char* stage, std::size_t total)
+      : context_(context),
+        stage_(stage),
+        total_(total),
+        every_(std::max<std::size_t>(1, total / 100)) {}
+  void step() {
+    const std::size_t done = ++done_;
+    if (done % every_ != 0 && done != total_) return;
+    const std::lock_guard lock(mutex_);
+    context_.report(stage_, done, total_);
+  }
+
+ private:
+  const Context& context_;
+  const char* stage_;
+  const std::size_t total_;
+  const std::size_t every_;
+  std::atomic<std::size_t> done_{0};
+  std::mutex mutex_;
+};
+
+std::string describe(const Scene& scene, const Object& o) {
+  const std::string& name = scene.name_of(o);
+  return "node " + std::to_string(o.node) + (name.empty() ? "" : " '" + name + "'");
+}
+
+std::string text(const Vec3& p) {
+  return std::to_string(p.x) + "," + std::to_string(p.y) + "," + std::to_string(p.z);
+}
+
+/// What renderers' and maps' float positions, relative to the scene's centre, may be off by.
+double slack_for(const Aabb& bounds) {
+  if (bounds.empty()) return 0.001;
+  const Vec3 half = bounds.size() * 0.5;
+  const auto extent = static_cast<float>(std::max({half.x, half.y, half.z}));
+  const double ulp =
+      static_cast<double>(std::nextafter(extent, std::numeric_limits<float>::infinity())) -
+      static_cast<double>(extent);
+  return std::max(0.001, 4 * ulp);
+}
+
+/// Lowest y of all triangles, from the same products as the prisms' bases: those compare equal.
+double lowest_y(const Scene& scene) {
+  double floor = std::numeric_limits<double>::infinity();
+  for (const auto* list : {&scene.objects, &scene.hidden_solids})
+    for (const Object& o : *list) {
+      if (o.bounds.lo.y > floor) continue;
+      if (scene.mesh_of(o).triangles() == 0) floor = std::min(floor, o.bounds.lo.y);
+      for (std::size_t t = 0; t < scene.mesh_of(o).triangles(); ++t) {
+        const Triangle w = world_triangle(scene, o, t);
+        floor = std::min({floor, w.a.y, w.b.y, w.c.y});
+      }
+    }
+  return std::isfinite(floor) ? floor : 0;
+}
+
+struct ShrunkStack {
+  std::vector<Prism> prisms;
+  double volume = 0;
+  std::size_t failed = 0;
+  std::size_t thin = 0;
+};
+
+/// E(region x [bottom, top], W) with W the hull of V' - apex: footprints by V's shadow, tops stay
+/// (less slack), bottoms rise by all that the cell can move up or down.
+ShrunkStack shrink_stack(const FusedStack& stack, const OccluderSet& set, const Reach& grown,
+                         const Eroder& eroder) {
+  ShrunkStack out;
+  const bool reaches_down = stack.grounded || stack.bottom <= set.floor;
+  const double raised = stack.bottom + 2 * grown.half_extents().y;
+  struct Piece {
+    Polygon footprint;
+    double area;
+  };
+  std::vector<Piece> above;  // what stands at the level treated before (the next higher one)
+  for (auto level = stack.levels.rbegin(); level != stack.levels.rend(); ++level) {
+    const double top = level->top - set.slack_m;
+    std::vector<Piece> here;
+    if (!reaches_down && raised >= top) {
+      ++out.thin;
+      continue;
+    }
+    for (const Polygon& region : level->region) {
+      std::vector<Polygon> eroded = eroder.erode(region, grown);
+      std::erase_if(eroded, [](const Polygon& p) { return area(p) < 0.01; });
+      if (eroded.empty()) ++out.thin;
+      for (Polygon& piece : eroded) {
+        if (!within_erosion(piece, region, grown)) {
+          ++out.failed;
+          continue;
+        }
+        here.push_back({std::move(piece), 0});
+        here.back().area = area(here.back().footprint);
+      }
+    }
+    std::vector<Piece> standing;
+    for (Piece& p : here) {
+      double covered = 0;
+      std::vector<const Piece*> higher;
+      for (const Piece& q : above)
+        if (contains(p.footprint, q.footprint.rings[0][0])) {
+          covered += q.area;
+          higher.push_back(&q);
+        }
+      // A level that adds next to nothing to the one above is not worth its walls.
+      if (covered >= 0.995 * p.area) {
+        for (const Piece* q : higher)
+          standing.push_back(*q);
+        continue;
+      }
+      out.prisms.push_back({p.footprint, reaches_down ? std::min(raised, top) : raised, top,
+                            stack.bottom, stack.grounded});
+      standing.push_back(std::move(p));
+    }
+    double a = 0;
+    for (const Piece& p : standing)
+      a += p.area;
+    const double below = level + 1 == stack.levels.rend() ? (reaches_down ? stack.bottom : raised)
+                                                          : (level + 1)->top - set.slack_m;
+    out.volume += a * std::max(0.0, top - std::max(below, reaches_down ? stack.bottom : raised));
+    above = std::move(standing);
+  }
+  std::reverse(out.prisms.begin(), out.prisms.end());
+  return out;
+}
+
+}  // namespace
+
+Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Eroder& eroder,
+                      const Context& context) {
+  const auto start = std::chrono::steady_clock::now();
+  Shrunk result;
+  OccluderSet& set = result.set;
+  ShrinkReport& report = result.report;
+  set.scene_hash = scene.hash;
+  set.reach = options.reach;
+  set.view_space = options.view_space;
+  set.slack_m = slack_for(scene.bounds);
+  set.floor = lowest_y(scene);
+
+  std::vector<const Object*> objects;
+  for (const Object& o : scene.objects)
+    objects.push_back(&o);
+  for (const Object& o : scene.hidden_solids)
+    objects.push_back(&o);
+  report.occluders_in = objects.size();
+
+  const std::optional<Ground> terrain = find_ground(scene, context);
+  std::vector<bool> is_ground(objects.size(), false);
+  if (terrain) {
+    set.ground = terrain->rectangle();
+    for (const ObjectId id : terrain->objects())
+      is_ground[id] = true;
+  }
+
+  std::vector<ObjectSolids> found(objects.size());
+  {
+    Progress progress(context, "prisms", objects.size());
+    parallel_for(context, objects.size(), [&](std::size_t i) {
+      if (is_ground[i]) {
+        ++found[i].left_out["ground"];
+      } else {
+        found[i] = extract_prisms(scene, *objects[i]);
+        for (Prism& p : found[i].prisms)
+          p.grounded = terrain && terrain->covers_at_or_above(p.footprint, p.solid_bottom);
+      }
+      progress.step();
+    });
+  }
+  if (context.stopped()) return cancelled();
+
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    report.solid_volume += found[i].volume;
+    for (const auto& [reason, count] : found[i].left_out)
+      report.left_out[reason] += count;
+    for (Prism& p : found[i].prisms) {
+      const Aabb box = p.bounds();
+      for (std::size_t s = 0; s < options.view_space.seeds.size(); ++s) {
+        const Vec3& seed = options.view_space.seeds[s];
+        if (box.contains(seed) && seed.y > p.bottom && seed.y < p.top &&
+            contains(p.footprint, ground(seed)))
+          return invalid_argument("view space seed " + std::to_string(s) + " (" + text(seed) +
+                                  ") lies inside the solid of " + describe(scene, *objects[i]));
+      }
+      set.solids.push_back(std::move(p));
+    }
+  }
+
+  const std::vector<FusedStack> stacks = fuse(set.solids, set.floor, {}, context);
+  if (context.stopped()) return cancelled();
+
+  const double vertical = vertical_tolerance(options.reach) + set.slack_m;
+  const Reach grown = options.reach.grown(kReachToleranceM + set.slack_m, vertical);
+  std::vector<ShrunkStack> shrunk(stacks.size());
+  {
+    Progress progress(context, "eroding", stacks.size());
+    parallel_for(context, stacks.size(), [&](std::size_t i) {
+      shrunk[i] = shrink_stack(stacks[i], set, grown, eroder);
+      progress.step();
+    });
+  }
+  if (context.stopped()) return cancelled();
+  for (ShrunkStack& s : shrunk) {
+    report.kept_volume += s.volume;
+    if (s.failed > 0) report.left_out["failed distance check"] += s.failed;
+    if (s.thin > 0) report.left_out["too thin for the reach"] += s.thin;
+    for (Prism& p : s.prisms)
+      set.shrunk.push_back(std::move(p));
+  }
+  report.occluders_out = set.shrunk.size();
+  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
+}  // namespace ivis
