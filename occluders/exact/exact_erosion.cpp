@@ -31,10 +31,10 @@ using Arrangement = CGAL::Arrangement_with_history_2<Traits>;
 
 // The reach is grown by this, which pays for rounding its corners and the result's to double.
 constexpr double kInwardsM = 1e-6;
-// Directions of walls nearer than this (radians) share a side of the reach's polygon: at a radius
-// of 1 m it oversteps the disc by 1e-7 m there.
-constexpr double kSameDirection = 1e-3;
-constexpr std::size_t kMostDirections = 64;
+// Directions of walls nearer than this (radians) share a side of the reach's polygon. Between sides a
+// wall loses its angle to the nearest times half their gap: below 1e-6 of the radius.
+constexpr double kSameDirection = 1e-5;
+constexpr std::size_t kMostDirections = 256;
 
 /// A part of the input in one piece: outer ring and what is cut out of it, all simple,
 /// anticlockwise.
@@ -194,9 +194,9 @@ Ring circumscribed(const Polygon& polygon, const Reach& reach, int k) {
   std::sort(angles.begin(), angles.end());
   // Of near-equal angles one does; the turn's last and first may be near each other as well.
   angles.erase(
-      std::unique(angles.begin(), angles.end(), [](double a, double b) { return b - a < 1e-6; }),
+      std::unique(angles.begin(), angles.end(), [](double a, double b) { return b - a < kSameDirection / 2; }),
       angles.end());
-  while (angles.size() > 1 && angles.front() + kTurn - angles.back() < 1e-6)
+  while (angles.size() > 1 && angles.front() + kTurn - angles.back() < kSameDirection / 2)
     angles.pop_back();
   for (std::size_t i = 0; i < angles.size(); ++i) {
     const double a = angles[i];
