@@ -12,9 +12,12 @@
 #include "occluders/fuse.h"
 #include "occluders/ground.h"
 #include "occluders/prisms.h"
+#include "occluders/simplify.h"
 
 namespace ivis {
 namespace {
+
+constexpr double kMinAreaM2 = 0.01;
 
 /// Cheap, thread-safe progress: reports about a hundred times a stage.
 class Progress {
@@ -82,6 +85,18 @@ struct ShrunkStack {
   std::size_t thin = 0;
 };
 
+/// The piece with fewer corners if that passes the distance check, else as it is if that does.
+std::vector<Polygon> gated(const Polygon& piece, const Polygon& region, const Reach& reach,
+                           std::size_t& failed) {
+  std::vector<Polygon> simple = simplify_inwards(piece);
+  if (std::all_of(simple.begin(), simple.end(),
+                  [&](const Polygon& p) { return within_erosion(p, region, reach); }))
+    return simple;
+  if (within_erosion(piece, region, reach)) return {piece};
+  ++failed;
+  return {};
+}
+
 /// E(region x [bottom, top], W) with W the hull of V' - apex: footprints by V's shadow, tops stay
 /// (less slack), bottoms rise by all that the cell can move up or down.
 ShrunkStack shrink_stack(const FusedStack& stack, const OccluderSet& set, const Reach& grown,
@@ -103,15 +118,13 @@ ShrunkStack shrink_stack(const FusedStack& stack, const OccluderSet& set, const 
     }
     for (const Polygon& region : level->region) {
       std::vector<Polygon> eroded = eroder.erode(region, grown);
-      std::erase_if(eroded, [](const Polygon& p) { return area(p) < 0.01; });
+      std::erase_if(eroded, [](const Polygon& p) { return area(p) < kMinAreaM2; });
       if (eroded.empty()) ++out.thin;
-      for (Polygon& piece : eroded) {
-        if (!within_erosion(piece, region, grown)) {
-          ++out.failed;
-          continue;
+      for (const Polygon& exact : eroded) {
+        for (Polygon& piece : gated(exact, region, grown, out.failed)) {
+          const double a = area(piece);
+          if (a >= kMinAreaM2) here.push_back({std::move(piece), a});
         }
-        here.push_back({std::move(piece), 0});
-        here.back().area = area(here.back().footprint);
       }
     }
     std::vector<Piece> standing;
