@@ -31,8 +31,8 @@ using Arrangement = CGAL::Arrangement_with_history_2<Traits>;
 
 // The reach is grown by this, which pays for rounding its corners and the result's to double.
 constexpr double kInwardsM = 1e-6;
-// Directions of walls nearer than this (radians) share a side of the reach's polygon. Between sides a
-// wall loses its angle to the nearest times half their gap: below 1e-6 of the radius.
+// Directions of walls nearer than this (radians) share a side of the reach's polygon. Between sides
+// a wall loses its angle to the nearest times half their gap: below 1e-6 of the radius.
 constexpr double kSameDirection = 1e-5;
 constexpr std::size_t kMostDirections = 256;
 
@@ -154,14 +154,15 @@ std::vector<Piece> clean(const Polygon& polygon) {
   return pieces;
 }
 
-/// Angles of the walls' normals in the space in which the ellipse is a circle, longest walls first.
+/// Angles at which the grown complement pushes the walls in (their inward normals, seen in the
+/// space in which the ellipse is a circle), longest walls first.
 std::vector<double> wall_angles(const Polygon& polygon, const Vec2& extent) {
   std::map<long, std::pair<double, double>> length_and_angle;
   for (const auto& ring : polygon.rings)
     for (std::size_t i = 0; i < ring.size(); ++i) {
       const Vec2 d = ring[(i + 1) % ring.size()] - ring[i];
       if (d == Vec2{0}) continue;
-      const double angle = std::atan2(-d.x * extent.y, d.y * extent.x);
+      const double angle = std::atan2(d.x * extent.y, -d.y * extent.x);
       auto& [length, kept] = length_and_angle[std::lround(angle / kSameDirection)];
       if (length == 0) kept = angle;
       length += glm::length(d);
@@ -178,7 +179,7 @@ std::vector<double> wall_angles(const Polygon& polygon, const Vec2& extent) {
 }
 
 // Tangents all round, and one along every wall: a wall then loses nothing, and the rest oversteps
-// only round reflex corners. The reach is symmetric, so it is its own reflection.
+// only round reflex corners. Subtraction wants the reflected reach, which is the reach itself.
 Ring circumscribed(const Polygon& polygon, const Reach& reach, int k) {
   const Vec2 extent{reach.half_extents().x + kInwardsM, reach.half_extents().z + kInwardsM};
   Ring ring;
@@ -193,9 +194,9 @@ Ring circumscribed(const Polygon& polygon, const Reach& reach, int k) {
     angles.push_back(kTurn * i / k - std::numbers::pi);
   std::sort(angles.begin(), angles.end());
   // Of near-equal angles one does; the turn's last and first may be near each other as well.
-  angles.erase(
-      std::unique(angles.begin(), angles.end(), [](double a, double b) { return b - a < kSameDirection / 2; }),
-      angles.end());
+  angles.erase(std::unique(angles.begin(), angles.end(),
+                           [](double a, double b) { return b - a < kSameDirection / 2; }),
+               angles.end());
   while (angles.size() > 1 && angles.front() + kTurn - angles.back() < kSameDirection / 2)
     angles.pop_back();
   for (std::size_t i = 0; i < angles.size(); ++i) {

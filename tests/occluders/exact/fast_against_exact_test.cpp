@@ -1,5 +1,5 @@
-// Holds the fast eroder against the exact one, and both against the distance, on footprints as cities
-// have them.
+// Holds the fast eroder against the exact one, and both against the distance, on footprints as
+// cities have them.
 
 #include <gtest/gtest.h>
 
@@ -34,7 +34,9 @@ class Footprints {
   }
 
  private:
-  double in(double lo, double hi) { return std::uniform_real_distribution<double>(lo, hi)(random_); }
+  double in(double lo, double hi) {
+    return std::uniform_real_distribution<double>(lo, hi)(random_);
+  }
   double size() { return in(8, 25); }
   static Ring rectangle(double x0, double z0, double x1, double z1) {
     return {{x0, z0}, {x1, z0}, {x1, z1}, {x0, z1}};
@@ -50,7 +52,8 @@ class Footprints {
     const double w = in(6, 12);
     const double gap = in(0.5, 12);
     const double b = size() + 8;
-    return {{0, 0}, {2 * w + gap, 0}, {2 * w + gap, b}, {w + gap, b}, {w + gap, 8}, {w, 8}, {w, b}, {0, b}};
+    return {{0, 0},       {2 * w + gap, 0}, {2 * w + gap, b}, {w + gap, b},
+            {w + gap, 8}, {w, 8},           {w, b},           {0, b}};
   }
   std::vector<Ring> courtyard() {
     const double a = size() + 10;
@@ -65,7 +68,8 @@ class Footprints {
   Ring neck() {
     const double w = in(0.5, 2) * 2 + in(-0.01, 0.01);
     const double z = in(0, 1) < 0.3 ? 1.5 : in(1, 5);
-    return {{0, 0}, {10, 0}, {10, z}, {16, z}, {16, 0}, {28, 0}, {28, 12}, {16, 12}, {16, z + w}, {10, z + w}, {10, 12}, {0, 12}};
+    return {{0, 0},   {10, 0},  {10, z},     {16, z},     {16, 0},  {28, 0},
+            {28, 12}, {16, 12}, {16, z + w}, {10, z + w}, {10, 12}, {0, 12}};
   }
   Ring star() {
     const int n = static_cast<int>(in(5, 24));
@@ -85,13 +89,16 @@ class Footprints {
       const Vec2& b = clean[(i + 1) % clean.size()];
       ring.push_back(a);
       const double kind = in(0, 4);
-      if (kind < 1) ring.push_back(a + Vec2{in(-1e-4, 1e-4), in(-1e-4, 1e-4)});
-      else if (kind < 2) ring.push_back(glm::mix(a, b, 0.5) + Vec2{in(-1e-3, 1e-3), in(-1e-3, 1e-3)});
+      if (kind < 1)
+        ring.push_back(a + Vec2{in(-1e-4, 1e-4), in(-1e-4, 1e-4)});
+      else if (kind < 2)
+        ring.push_back(glm::mix(a, b, 0.5) + Vec2{in(-1e-3, 1e-3), in(-1e-3, 1e-3)});
       else if (kind < 3) {
         const Vec2 along = glm::normalize(b - a);
         const Vec2 inwards{-along.y, along.x};
         const Vec2 m = glm::mix(a, b, 0.4);
-        ring.insert(ring.end(), {m, m + in(1e-3, 0.05) * inwards, m + 0.3 * along + 0.02 * inwards, m + 0.3 * along});
+        ring.insert(ring.end(), {m, m + in(1e-3, 0.05) * inwards, m + 0.3 * along + 0.02 * inwards,
+                                 m + 0.3 * along});
       } else {
         ring.push_back(a);
       }
@@ -106,21 +113,25 @@ class Footprints {
       const double x = 9 * (i % 5) + in(-0.5, 0.5);
       const double z = 11 * (i / 5) + in(-2, 2);
       Ring house = rectangle(x, z, x + in(8, 10), z + in(9, 14));
-      for (Vec2& p : house) p = turned(p, angle + in(-0.02, 0.02) * (i % 3));
+      for (Vec2& p : house)
+        p = turned(p, angle + in(-0.02, 0.02) * (i % 3));
       houses.push_back(house);
     }
     std::vector<Polygon> pieces = unite(houses, Fill::kNonZero);
-    return *std::max_element(pieces.begin(), pieces.end(), [](const Polygon& p, const Polygon& q) { return area(p) < area(q); });
+    return *std::max_element(pieces.begin(), pieces.end(),
+                             [](const Polygon& p, const Polygon& q) { return area(p) < area(q); });
   }
   static Vec2 turned(const Vec2& p, double angle) {
-    return {std::cos(angle) * p.x - std::sin(angle) * p.y, std::sin(angle) * p.x + std::cos(angle) * p.y};
+    return {std::cos(angle) * p.x - std::sin(angle) * p.y,
+            std::sin(angle) * p.x + std::cos(angle) * p.y};
   }
   /// Anywhere within 10 km, turned; on the grid as the shrinker hands footprints over.
   Polygon placed(std::vector<Ring> rings) {
     const double angle = in(0, 1) < 0.3 ? 0 : in(0, 6.3);
     const Vec2 at{in(-1e4, 1e4), in(-1e4, 1e4)};
     for (Ring& ring : rings)
-      for (Vec2& p : ring) p = snap(turned(p, angle) + at);
+      for (Vec2& p : ring)
+        p = snap(turned(p, angle) + at);
     return {std::move(rings)};
   }
 
@@ -175,11 +186,13 @@ class FastAgainstExact : public testing::TestWithParam<const char*> {};
 constexpr int kFootprints = 16;
 
 TEST_P(FastAgainstExact, LiesInsideTheTrueErosionAndKeepsItsArea) {
-  const Reach reaches[] = {Reach::disc(1.5), Reach::disc(0.2), Reach::ball(3), Reach::cylinder(1, 0.1),
-                           Reach::ellipsoid({2, 1, 0.5}), Reach::box({1, 1, 2})};
-  const FastEroder fast(32);
+  // A reach of 3 m leaves so little of a house that its reflex corners need the finer polygon.
+  const std::pair<Reach, FastEroder> cases[] = {
+      {Reach::disc(1.5), FastEroder()},        {Reach::disc(0.2), FastEroder()},
+      {Reach::cylinder(1, 0.1), FastEroder()}, {Reach::ellipsoid({2, 1, 0.5}), FastEroder()},
+      {Reach::box({1, 1, 2}), FastEroder()},   {Reach::ball(3), FastEroder(32)}};
   const ExactEroder exact;
-  for (const Reach& reach : reaches) {
+  for (const auto& [reach, fast] : cases) {
     SCOPED_TRACE(reach.to_string());
     Footprints footprints(11);
     double fast_area = 0;
@@ -197,9 +210,8 @@ TEST_P(FastAgainstExact, LiesInsideTheTrueErosionAndKeepsItsArea) {
         }
       const double f = area(by_fast);
       const double e = area(by_exact);
-      // One by one: slivers and what hangs on them may differ, houses may not.
-      EXPECT_GE(f, 0.998 * e - 0.05);
-      EXPECT_GE(e, 0.9999 * f - 0.05);
+      EXPECT_GE(f, e - 0.002 * std::max(e, area(footprint) / 10));
+      EXPECT_GE(e, 0.9999 * f - 0.001);
       whole_area += area(footprint);
       fast_area += f;
       exact_area += e;
@@ -212,7 +224,8 @@ TEST_P(FastAgainstExact, LiesInsideTheTrueErosionAndKeepsItsArea) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Footprints, FastAgainstExact,
-                         testing::Values("rectangles", "ells", "us", "courtyards", "necks", "stars", "dirty", "blocks"),
+                         testing::Values("rectangles", "ells", "us", "courtyards", "necks", "stars",
+                                         "dirty", "blocks"),
                          [](const auto& param_info) { return std::string(param_info.param); });
 
 // The gate would notice: the same pieces against a reach a tenth of a millimetre larger.
