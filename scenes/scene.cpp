@@ -127,11 +127,14 @@ class Bounds {
 
  private:
   static constexpr double kRounding = 1e-12;
-  static Vec3 world(const Mat4& m, const Vec3& p) { return Vec3(m * glm::dvec4(p, 1.0)); }
+  static Vec3 world(const Mat4& m, const Vec3& p) {
+    const auto row = [&](int r) { return m[0][r] * p.x + m[1][r] * p.y + m[2][r] * p.z + m[3][r]; };
+    return {row(0), row(1), row(2)};
+  }
 
   const Scene& scene_;
   std::vector<Extent> extents_;
-  std::size_t vertices_left_ = std::size_t{1} << 28U;
+  std::size_t vertices_left_ = std::size_t{1} << 27U;
 };
 
 class Hasher {

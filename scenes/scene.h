@@ -43,7 +43,7 @@ struct Object {
   std::uint32_t instance = 0;  ///< 0 unless EXT_mesh_gpu_instancing
   std::uint32_t mesh = 0;      ///< index into Scene::meshes
   OccluderTag tag = OccluderTag::kAuto;
-  bool always_visible = false;  ///< skinned, morphed or animated: bounds are not to be trusted
+  bool always_visible = false;  ///< skinned, morphed or animated: bounds are not to be trusted, tag is kNever
   Mat4 to_world{1};             ///< finite
   Aabb bounds;                  ///< world; of all its triangles, grown by rounding; a point at the node's origin when there are none
 };
@@ -71,13 +71,15 @@ struct Scene {
   const std::string& name_of(const Object& o) const { return node_names[o.node]; }
 };
 
-/// Triangle `t` of the object's mesh, in world space.
+/// Triangle `t` of the object's mesh, in world space, counter-clockwise seen from its front: a mirroring
+/// transform turns the winding round (glTF 2.0 section 3.7.4), which is undone here.
 inline Triangle world_triangle(const Scene& scene, const Object& object, std::size_t t) {
   const Mesh& mesh = scene.mesh_of(object);
   const auto corner = [&](std::size_t k) {
     return Vec3(object.to_world * glm::dvec4(Vec3(mesh.positions[mesh.indices[3 * t + k]]), 1.0));
   };
-  return {corner(0), corner(1), corner(2)};
+  const bool mirrored = glm::determinant(glm::dmat3(object.to_world)) < 0;
+  return {corner(0), corner(mirrored ? 2 : 1), corner(mirrored ? 1 : 2)};
 }
 
 /// Fills bounds, triangle_count and hash from the rest, and checks what the struct promises (indices in
