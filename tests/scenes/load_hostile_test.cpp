@@ -453,6 +453,8 @@ TEST_F(LoadHostile, StaysInItsFolder) {
         std::string("%zz"), std::string("%"), std::string("/dev/zero")}) {
     IVIS_EXPECT_ERROR(with(uri), ErrorCode::kInput, "scene.gltf", "buffer 0: uri '");
   }
+  for (const char* uri : {"sub/../fine.bin", "%2e%2e/inner/fine.bin"})
+    IVIS_EXPECT_ERROR(with(uri), ErrorCode::kInput, "'..', expected a file beside this one");
   IVIS_EXPECT_ERROR(with("sub"), ErrorCode::kIo, "not a regular file");
   IVIS_EXPECT_ERROR(with("absent.bin"), ErrorCode::kIo, "absent.bin");
   f.root["buffers"] = {{{"byteLength", 37}, {"uri", "fine.bin"}}};
