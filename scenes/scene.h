@@ -71,15 +71,14 @@ struct Scene {
   const std::string& name_of(const Object& o) const { return node_names[o.node]; }
 };
 
-/// Triangle `t` of the object's mesh, in world space, counter-clockwise seen from its front: a mirroring
-/// transform turns the winding round (glTF 2.0 section 3.7.4), which is undone here.
+/// Triangle `t` of the object's mesh, in world space, corners in the order of the mesh: under a mirroring
+/// to_world (negative determinant) its front is the clockwise side (glTF 2.0 section 3.7.4).
 inline Triangle world_triangle(const Scene& scene, const Object& object, std::size_t t) {
   const Mesh& mesh = scene.mesh_of(object);
   const auto corner = [&](std::size_t k) {
     return Vec3(object.to_world * glm::dvec4(Vec3(mesh.positions[mesh.indices[3 * t + k]]), 1.0));
   };
-  const bool mirrored = glm::determinant(glm::dmat3(object.to_world)) < 0;
-  return {corner(0), corner(mirrored ? 2 : 1), corner(mirrored ? 1 : 2)};
+  return {corner(0), corner(1), corner(2)};
 }
 
 /// Fills bounds, triangle_count and hash from the rest, and checks what the struct promises (indices in
