@@ -174,6 +174,17 @@ TEST(PvsDecoder, RejectsTrailingBytes) {
   }
 }
 
+// Zeros are what a decoder reads behind the end, so only the count of bytes tells these.
+TEST(PvsDecoder, RejectsBytesBehindZeros) {
+  const Coded c = coded(5000, 8);
+  for (std::size_t zeros = 1; zeros < 12; ++zeros) {
+    auto longer = c.bytes;
+    longer.insert(longer.end(), zeros, std::byte{0});
+    longer.push_back(std::byte{1});
+    EXPECT_FALSE(decode_pvs(longer, c.base)) << zeros;
+  }
+}
+
 TEST(PvsDecoder, SaysWhatIsWrong) {
   const Coded c = coded(5000, 9);
   const auto message = [&](std::vector<std::byte> bytes, const PvsState& base) {
