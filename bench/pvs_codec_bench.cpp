@@ -1,7 +1,6 @@
-// Encoding and decoding a PVS of a street walk: 100,000 objects, some 1,750 of them listed, a fifth
+// Encoding and decoding a PVS of a street walk: 100,000 objects, some 1,750 of them listed, a sixth
 // of those changing a pose. Reports bytes a pose, their ratio to raw 32-bit ids, and a hash of all
-// decoded sets and payloads, so that a fast wrong answer shows. With a folder of recorded sets (see
-// IVIS_PVS_RANKS) it codes those instead.
+// sets and payloads, so that a fast wrong answer shows.
 
 #include <bit>
 #include <cstdint>
