@@ -144,6 +144,8 @@ PvsState::PvsState(std::uint32_t objects) : set(objects), before(objects) {}
 
 std::vector<std::byte> encode_pvs(const RankSet& set, const PvsState& base, PvsState& after) {
   IVIS_ASSERT(set.size == base.set.size, "set and base are of one scene");
+  IVIS_ASSERT(set.size % 64 == 0 || set.words.back() >> (set.size % 64) == 0,
+              "bits past the last rank are zero");
   Encoding coder;
   PvsState result;
   result.model = base.model;
