@@ -58,10 +58,14 @@ std::uint32_t code_block(Coder& coder, PvsModel& model, std::uint32_t set, std::
                          std::uint32_t next, int ranks, std::uint32_t left_next,
                          std::uint32_t left_before) {
   std::uint32_t out = 0;
+  bool any = false;
   for (int k = 0; k < ranks; ++k) {
     const std::uint32_t was = (set >> k) & 1U, earlier = (before >> k) & 1U;
     const std::uint32_t context = was | earlier << 1U | left_before << 2U | left_next << 3U;
-    const bool changed = coder.code(model.rank[context], [&] { return ((next >> k) & 1U) != was; });
+    const bool implied = k + 1 == ranks && !any;
+    const bool changed =
+        implied || coder.code(model.rank[context], [&] { return ((next >> k) & 1U) != was; });
+    any |= changed;
     const std::uint32_t now = was ^ (changed ? 1U : 0U);
     out |= now << k;
     left_next = (left_next << 1U | now) & 3U;  // the nearer rank in bit 0
@@ -89,14 +93,17 @@ void code_difference(Coder& coder, const PvsState& base, PvsModel& model, RankSe
       left_block = false;
       continue;
     }
+    bool any_block = false;
     const auto end =
         static_cast<std::uint32_t>(std::min<std::size_t>(base.set.size, 64 * end_word));
     for (auto first = static_cast<std::uint32_t>(64 * first_word); first < end; first += kBlock) {
       const std::uint32_t set = block_of(base.set, first), before = block_of(base.before, first),
                           coded = block_of(next, first);
-      left_block = coder.code(model.block[block_context(set, before, left_block)],
-                              [&] { return coded != set; });
+      const bool implied = first + kBlock >= end && !any_block;
+      left_block = implied || coder.code(model.block[block_context(set, before, left_block)],
+                                         [&] { return coded != set; });
       if (!left_block) continue;
+      any_block = true;
       const std::uint32_t left_next =
           first == 0 ? 0U : (next.test(first - 1) ? 1U : 0U) | (next.test(first - 2) ? 2U : 0U);
       const std::uint32_t left_before = first != 0 && base.before.test(first - 1) ? 1U : 0U;
@@ -137,6 +144,8 @@ PvsState::PvsState(std::uint32_t objects) : set(objects), before(objects) {}
 
 std::vector<std::byte> encode_pvs(const RankSet& set, const PvsState& base, PvsState& after) {
   IVIS_ASSERT(set.size == base.set.size, "set and base are of one scene");
+  IVIS_ASSERT(set.size % 64 == 0 || set.words.back() >> (set.size % 64) == 0,
+              "bits past the last rank are zero");
   Encoding coder;
   PvsState result;
   result.model = base.model;

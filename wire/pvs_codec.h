@@ -48,11 +48,15 @@ struct PvsState {
 };
 
 /// Codes `set` as its difference to `base` and moves the model on: `after` is what the decoder will
-/// hold. Requires set.size == base.set.size. Cost: see bench/pvs_codec_bench.cpp.
+/// hold, and may be `base` itself. Requires set.size == base.set.size.
+/// Cost:    a few bits a change; O(words of the set + 32 a changed block),
+/// bench/pvs_codec_bench.cpp Threads: reentrant.
 std::vector<std::byte> encode_pvs(const RankSet& set, const PvsState& base, PvsState& after);
 
-/// Errors: kInput for bytes that are not such a difference (truncated, trailing, out of range):
-/// never reads outside `bytes`, time and memory are bounded by base.set.size and bytes.size().
+/// Errors: kInput for bytes that encode_pvs does not write against this base: truncated, trailing,
+///         damaged, or of another base. What looks right by chance passes a 16-bit check of the set
+///         once in 65,536 times, and is then some set of the right size.
+/// Bounds: never reads outside `bytes`; time and memory are O(base.set.size).
 Result<PvsState> decode_pvs(std::span<const std::byte> bytes, const PvsState& base);
 
 }  // namespace ivis::wire

@@ -174,6 +174,44 @@ TEST(PvsDecoder, RejectsTrailingBytes) {
   }
 }
 
+// Zeros are what a decoder reads behind the end, so only the count of bytes tells these.
+TEST(PvsDecoder, RejectsBytesBehindZeros) {
+  const Coded c = coded(5000, 8);
+  for (std::size_t zeros = 1; zeros < 12; ++zeros) {
+    auto longer = c.bytes;
+    longer.insert(longer.end(), zeros, std::byte{0});
+    longer.push_back(std::byte{1});
+    EXPECT_FALSE(decode_pvs(longer, c.base)) << zeros;
+  }
+}
+
+// A set has one payload against a base. All codes of up to two bytes are tried, each with the check
+// that its set would have.
+TEST(PvsDecoder, TakesOnlyWhatAnEncoderWrites) {
+  constexpr std::uint32_t kObjects = 40;
+  int taken = 0;
+  for (std::uint32_t code = 0; code < 65536; ++code) {
+    std::vector<std::byte> bytes{
+        {}, {}, static_cast<std::byte>(code >> 8U), static_cast<std::byte>(code)};
+    while (bytes.size() > 2 && bytes.back() == std::byte{0})
+      bytes.pop_back();
+    const auto decoded =
+        test::spec_decode(bytes, test::SpecState(kObjects), test::SpecCheck::kIgnore);
+    if (!decoded) continue;
+    ++taken;
+    RankSet set(kObjects);
+    for (Rank r = 0; r < kObjects; ++r)
+      if (decoded->set[r]) set.set(r);
+    PvsState after;
+    const auto written = encode_pvs(set, PvsState(kObjects), after);
+    bytes[0] = written[0];
+    bytes[1] = written[1];
+    ASSERT_EQ(written, bytes) << code;
+    ASSERT_TRUE(decode_pvs(bytes, PvsState(kObjects))) << code;
+  }
+  EXPECT_GT(taken, 40);
+}
+
 TEST(PvsDecoder, SaysWhatIsWrong) {
   const Coded c = coded(5000, 9);
   const auto message = [&](std::vector<std::byte> bytes, const PvsState& base) {

@@ -1,0 +1,85 @@
+// Envelopes that FlatBuffers finds in order and the protocol does not: made with the schema
+// directly.
+
+#include <gtest/gtest.h>
+
+#include "ivis_generated.h"
+#include "wire/messages.h"
+
+namespace ivis::wire {
+namespace {
+
+using flatbuffers::FlatBufferBuilder;
+
+const fb::Bye kBye(1);
+const fb::Pvs kPvs(1, 0, 2, 0, 3);
+const fb::Pose kPose(1, 2, 0, fb::Vec3(1, 2, 3));
+
+std::string error_of(FlatBufferBuilder& b, flatbuffers::Offset<fb::Envelope> envelope) {
+  b.FinishSizePrefixed(envelope);
+  const auto m = decode({reinterpret_cast<const std::byte*>(b.GetBufferPointer()), b.GetSize()});
+  return m ? std::string("no error") : m.error().message;
+}
+
+TEST(WireEnvelope, MustHoldOneKind) {
+  FlatBufferBuilder none, two;
+  EXPECT_EQ(error_of(none, fb::CreateEnvelope(none)),
+            "message: 0 known kinds in one envelope, expected 1");
+  EXPECT_EQ(error_of(two, fb::CreateEnvelope(two, nullptr, 0, nullptr, &kPose, 0, 0, 0, &kBye)),
+            "message: 2 known kinds in one envelope, expected 1");
+}
+
+TEST(WireEnvelope, MustHoldPayloadAndCentreOnlyWithAPvs) {
+  const std::vector<std::uint8_t> payload(4);
+  const fb::Vec3 centre(1, 2, 3);
+  FlatBufferBuilder a, b, c;
+  const auto in_a = a.CreateVector(payload);
+  EXPECT_EQ(error_of(a, fb::CreateEnvelope(a, nullptr, in_a, nullptr, &kPose)),
+            "message: a payload or centre without a pvs");
+  EXPECT_EQ(error_of(b, fb::CreateEnvelope(b, nullptr, 0, &centre, &kPose)),
+            "message: a payload or centre without a pvs");
+  const auto in_c = c.CreateVector(payload);
+  EXPECT_EQ(error_of(c, fb::CreateEnvelope(c, &kPvs, in_c, &centre)), "no error");
+}
+
+TEST(WireEnvelope, MustKeepStringsToTheirBounds) {
+  FlatBufferBuilder a, b, c, d, e;
+  const std::string name(257, 'x'), text(1025, 'x');
+  const auto hello = fb::CreateHello(a, 1, true, 0, a.CreateString(name));
+  EXPECT_EQ(error_of(a, fb::CreateEnvelope(a, nullptr, 0, nullptr, nullptr, hello)),
+            "hello: reach: 257 bytes, at most 256");
+  const auto reach = fb::CreateWelcome(b, 1, 2, 3, 4, 5, b.CreateString(name));
+  EXPECT_EQ(error_of(b, fb::CreateEnvelope(b, nullptr, 0, nullptr, nullptr, 0, reach)),
+            "welcome: reach: 257 bytes, at most 256");
+  const auto method = fb::CreateWelcome(c, 1, 2, 3, 4, 5, 0, c.CreateString(name));
+  EXPECT_EQ(error_of(c, fb::CreateEnvelope(c, nullptr, 0, nullptr, nullptr, 0, method)),
+            "welcome: method: 257 bytes, at most 256");
+  const auto refused = fb::CreateRefused(d, 1, 3, d.CreateString(text));
+  EXPECT_EQ(error_of(d, fb::CreateEnvelope(d, nullptr, 0, nullptr, nullptr, 0, 0, refused)),
+            "refused: text: 1025 bytes, at most 1024");
+  const auto longest = fb::CreateRefused(e, 1, 3, e.CreateString(text.data(), 1024));
+  EXPECT_EQ(error_of(e, fb::CreateEnvelope(e, nullptr, 0, nullptr, nullptr, 0, 0, longest)),
+            "no error");
+}
+
+// A writer in another language may put tables and vectors in any order.
+TEST(WireEnvelope, MayBeLaidOutInAnotherOrder) {
+  FlatBufferBuilder b;
+  b.ForceDefaults(true);
+  const auto method = b.CreateString("m");
+  const auto reach = b.CreateString("ball:2");
+  fb::WelcomeBuilder w(b);
+  w.add_method(method);
+  w.add_objects(0);
+  w.add_session(9);
+  w.add_reach(reach);
+  w.add_version(1);
+  const auto welcome = w.Finish();
+  b.FinishSizePrefixed(fb::CreateEnvelope(b, nullptr, 0, nullptr, nullptr, 0, welcome));
+  const auto m = decode({reinterpret_cast<const std::byte*>(b.GetBufferPointer()), b.GetSize()});
+  ASSERT_TRUE(m) << m.error().message;
+  EXPECT_EQ(std::get<Welcome>(*m), (Welcome{1, 9, 0, 0, 0, "ball:2", "m", {}}));
+}
+
+}  // namespace
+}  // namespace ivis::wire
