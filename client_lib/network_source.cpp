@@ -78,11 +78,11 @@ struct NetworkSource::Impl {
       return;
     }
     if (!pose_due) return;
+    if (!waiting_since) waiting_since = now;  // also while the pose cannot leave
     const Eye& eye = eyes[sequence % kRememberedEyes];
     // What is not known as a base is not acknowledged: the answer then is a full set.
     if (!put(wire::PoseMessage{session, sequence, history.newest(), eye.at})) return;
     pose_due = false;
-    if (!waiting_since) waiting_since = now;
   }
 
   void begin_again(std::string why, Clock::time_point hello_at) {
@@ -245,7 +245,7 @@ struct NetworkSource::Impl {
   Reach reach;
   std::uint64_t session = 0;  ///< 0: greeting
   Clock::time_point next_hello{};
-  std::optional<Clock::time_point> waiting_since;  ///< last sign of life with a pose unanswered
+  std::optional<Clock::time_point> waiting_since;  ///< last sign of life with a pose due or unanswered
   std::array<Eye, kRememberedEyes> eyes{};
   std::uint32_t sequence = 0;  ///< of the latest pose
   std::uint32_t answered = 0;  ///< of the latest pose that was

@@ -1,8 +1,10 @@
 #include "server/server.h"
 
 #include <cerrno>
+#include <string_view>
 #include <utility>
 
+#include <unistd.h>
 #include <zmq.hpp>
 
 #include "server/address.h"
@@ -19,6 +21,14 @@ constexpr int kMaxDrained = 4096;
 constexpr auto kLookAtStop = std::chrono::milliseconds(100);
 constexpr auto kHousekeeping = std::chrono::seconds(1);
 
+/// ZeroMQ leaves the file of an ipc socket behind. Removed while still bound: afterwards it could be
+/// another server's.
+void remove_ipc_file(const std::string& endpoint) {
+  constexpr std::string_view kIpc = "ipc://";
+  if (endpoint.starts_with(kIpc) && endpoint.size() > kIpc.size() && endpoint[kIpc.size()] != '@')
+    unlink(endpoint.c_str() + kIpc.size());
+}
+
 Error explain(const zmq::error_t& e, const std::string& listen) {
   if (e.num() == EADDRINUSE) return connection_error("another server already listens on " + listen);
   if (e.num() == EINVAL || e.num() == EPROTONOSUPPORT || e.num() == ENODEV)
@@ -32,6 +42,13 @@ struct Server::Impl {
   Impl(const ServerOptions& o, const ServedScene& scene, const Method& method, const Reach& reach, Log& l)
       : options(o), log(l), sessions(scene, method, reach, o.limits), context(1),
         socket(context, zmq::socket_type::router) {}
+
+  ~Impl() { give_back(); }
+
+  void give_back() {
+    if (held) remove_ipc_file(endpoint);
+    held = false;
+  }
 
   void configure() {
     socket.set(zmq::sockopt::router_mandatory, true);
@@ -105,6 +122,7 @@ struct Server::Impl {
   Log& log;
   SessionTable sessions;
   std::string endpoint;
+  bool held = false;  ///< the address is ours
   std::uint64_t dropped = 0;
   SessionTable::Time next_housekeeping{};
   zmq::context_t context;
@@ -124,6 +142,7 @@ Result<std::unique_ptr<Server>> Server::bind(const ServerOptions& options, const
     impl->configure();
     impl->socket.bind(options.listen);
     impl->endpoint = impl->socket.get(zmq::sockopt::last_endpoint);
+    impl->held = true;
     return std::unique_ptr<Server>(new Server(std::move(impl)));
   } catch (const zmq::error_t& e) {
     return explain(e, options.listen);
@@ -138,6 +157,7 @@ Status probe_address(const std::string& listen) {
     socket.set(zmq::sockopt::linger, 0);
     socket.set(zmq::sockopt::ipv6, true);
     socket.bind(listen);
+    remove_ipc_file(socket.get(zmq::sockopt::last_endpoint));
     return ok();
   } catch (const zmq::error_t& e) {
     return explain(e, listen);
@@ -157,6 +177,7 @@ void Server::run(const std::atomic<bool>& stop) {
   }
   try {
     for (const Outgoing& farewell : s.sessions.close()) s.send(farewell);
+    s.give_back();
     s.socket.close();
   } catch (const zmq::error_t& e) {
     s.log.warn("farewell_failed", {{"reason", e.what()}});

@@ -1,7 +1,10 @@
 #include <ivis/ivis.hpp>
 
 #include <cmath>
+#include <cstdio>
 #include <set>
+#include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -63,6 +66,219 @@ TEST_F(ClientOverTcp, GetsTheSetsThatTheMethodGives) {
   EXPECT_GT(stats.bytes, 40U);
   server.stop();
   EXPECT_EQ(server.counters().full_sets, 1U);
+}
+
+TEST_F(ClientOverTcp, BeforeTheFirstAnswerEverythingIsVisibleAndCounted) {
+  ivis_client_options options = ivis_client_options_default();
+  options.endpoint = "tcp://127.0.0.1:1";  // nobody
+  options.connect_timeout_ms = 0;
+  for (const ivis_policy policy : {IVIS_POLICY_EVERYTHING, IVIS_POLICY_STALL, IVIS_POLICY_INCOMPLETE}) {
+    options.policy = policy;
+    auto client = VisibilityClient::connect(options);
+    ASSERT_TRUE(client) << client.error();
+    const PvsView view = client.frame({1, 2, 3});
+    EXPECT_EQ(client.status(), IVIS_OK);
+    EXPECT_TRUE(view.everything());
+    EXPECT_FALSE(view.covered());
+    EXPECT_TRUE(view.visible(0));
+    EXPECT_TRUE(view.visible(12345));
+    EXPECT_EQ(view.eye()[2], 3);
+    EXPECT_EQ(client.stats().uncovered_frames, 1U);
+    EXPECT_EQ(client.stats().stalls, 0U);
+  }
+}
+
+TEST_F(ClientOverTcp, WelcomedWithoutAPvsEveryObjectIsVisible) {
+  RunningServer server(scene, method);
+  auto client = connect(server.endpoint());
+  ASSERT_TRUE(client) << client.error();
+  const PvsView view = client.view({1, 2, 3});
+  EXPECT_EQ(view.object_count(), scene.object_count());
+  EXPECT_EQ(view.count(), scene.object_count());
+  EXPECT_EQ(ids(view).size(), scene.object_count());
+  EXPECT_EQ(client.stats().uncovered_frames, 1U);
+}
+
+TEST_F(ClientOverTcp, MapsIdsToNodesAndBack) {
+  RunningServer server(scene, method);
+  auto client = connect(server.endpoint());
+  ASSERT_TRUE(client) << client.error();
+  EXPECT_EQ(client.info()->scene_hash, scene.hash);
+  EXPECT_EQ(client.info()->object_count, scene.object_count());
+  EXPECT_STREQ(client.info()->reach, "cylinder:1.5,0.1");
+  for (ObjectId id = 0; id < scene.object_count(); ++id) {
+    const auto node = client.node_of(id);
+    ASSERT_TRUE(node);
+    EXPECT_EQ(node->first, scene.objects[id].node);
+    EXPECT_EQ(client.id_of(node->first, node->second), id);
+  }
+  EXPECT_FALSE(client.node_of(static_cast<std::uint32_t>(scene.object_count())));
+  EXPECT_FALSE(client.id_of(0, 1));
+  EXPECT_FALSE(client.id_of(100000));
+}
+
+TEST_F(ClientOverTcp, OutsideTheCellEverythingIsVisibleByDefault) {
+  RunningServer server(scene, method);
+  auto client = connect(server.endpoint());
+  ASSERT_TRUE(client);
+  client.pose({4, 1, 4});
+  ASSERT_EQ(client.wait(kWait), IVIS_OK) << client.error();
+  EXPECT_FALSE(client.view({5.4, 1, 4}).everything()) << "within the reach";
+  const PvsView outside = client.view({5.6, 1, 4});
+  EXPECT_TRUE(outside.everything());
+  EXPECT_FALSE(outside.covered());
+  EXPECT_EQ(outside.count(), scene.object_count());
+  EXPECT_EQ(client.stats().uncovered_frames, 1U);
+}
+
+TEST_F(ClientOverTcp, StallNeverLeavesTheCell) {
+  RunningServer server(scene, method);
+  auto client = connect(server.endpoint(), IVIS_POLICY_STALL);
+  ASSERT_TRUE(client);
+  client.pose({4, 1, 4});
+  ASSERT_EQ(client.wait(kWait), IVIS_OK);
+  const ViewCell cell{{4, 1, 4}, Reach::cylinder(1.5, 0.1)};
+  for (int i = 0; i < 200; ++i) {
+    const double eye[3]{4 + 3 * std::sin(i * 1.0), 1 + 2 * std::sin(i * 0.3), 4 + 5 * std::cos(i * 0.7)};
+    const PvsView view = client.view(eye);
+    EXPECT_TRUE(cell.contains({view.eye()[0], view.eye()[1], view.eye()[2]}));
+    EXPECT_TRUE(view.covered());
+    EXPECT_FALSE(view.everything());
+    EXPECT_EQ(view.stalled(), !cell.contains({eye[0], eye[1], eye[2]}));
+  }
+  EXPECT_EQ(client.stats().uncovered_frames, 0U);
+  EXPECT_GT(client.stats().stalls, 100U);
+}
+
+TEST_F(ClientOverTcp, IncompleteUsesTheOldSetAndCounts) {
+  RunningServer server(scene, method);
+  auto client = connect(server.endpoint(), IVIS_POLICY_INCOMPLETE);
+  ASSERT_TRUE(client);
+  client.pose({4, 1, 4});
+  ASSERT_EQ(client.wait(kWait), IVIS_OK);
+  const PvsView view = client.view({14, 1, 4});
+  EXPECT_FALSE(view.covered());
+  EXPECT_FALSE(view.everything());
+  EXPECT_EQ(ids(view), solved(method, {4, 1, 4}));
+  EXPECT_EQ(view.eye()[0], 14);
+  EXPECT_EQ(client.stats().uncovered_frames, 1U);
+  EXPECT_EQ(client.stats().stalls, 0U);
+}
+
+TEST_F(ClientOverTcp, APvsOfEverythingCoversEveryEye) {
+  RunningServer server(scene, method);
+  auto client = connect(server.endpoint(), IVIS_POLICY_STALL);
+  ASSERT_TRUE(client);
+  client.pose({4, 60, 4});  // the method gives up there
+  ASSERT_EQ(client.wait(kWait), IVIS_OK);
+  const PvsView view = client.view({400, 60, 4});
+  EXPECT_TRUE(view.everything());
+  EXPECT_TRUE(view.covered());
+  EXPECT_FALSE(view.stalled());
+  EXPECT_EQ(view.count(), scene.object_count());
+  client.pose({4, 1, 4});
+  ASSERT_EQ(client.wait(kWait), IVIS_OK);
+  EXPECT_EQ(ids(client.view({4, 1, 4})), solved(method, {4, 1, 4}));
+}
+
+TEST_F(ClientOverTcp, AnEyeThatIsNotFiniteIsRefusedHereAndShowsEverything) {
+  RunningServer server(scene, method);
+  auto client = connect(server.endpoint(), IVIS_POLICY_STALL);
+  ASSERT_TRUE(client);
+  client.pose({4, 1, 4});
+  ASSERT_EQ(client.wait(kWait), IVIS_OK);
+  const PvsView view = client.frame({std::nan(""), 1, 4});
+  EXPECT_EQ(client.status(), IVIS_ERROR_ARGUMENT);
+  EXPECT_TRUE(view.everything());
+  EXPECT_FALSE(view.covered());
+  EXPECT_EQ(client.stats().poses, 1U);
+}
+
+TEST_F(ClientOverTcp, ManyClientsGetTheirOwnSets) {
+  RunningServer server(scene, method);
+  constexpr int kClients = 12;
+  std::vector<std::thread> threads;
+  std::atomic<int> wrong{0};
+  for (int c = 0; c < kClients; ++c) {
+    threads.emplace_back([&, c] {
+      auto client = connect(server.endpoint());
+      if (!client) {
+        ++wrong;
+        return;
+      }
+      for (int i = 0; i < 25; ++i) {
+        const double eye[3]{1.0 * i, 1, 3.0 * c};
+        client.pose(eye);
+        if (client.wait(kWait) != IVIS_OK || ids(client.view(eye)) != solved(method, eye)) ++wrong;
+      }
+    });
+  }
+  for (auto& t : threads) t.join();
+  EXPECT_EQ(wrong, 0);
+}
+
+TEST_F(ClientOverTcp, FramesWithoutWaitingEndInTheRightSet) {
+  RunningServer server(scene, method);
+  auto client = connect(server.endpoint());
+  ASSERT_TRUE(client);
+  for (int i = 0; i < 5000; ++i) client.frame({0.005 * i, 1, 10});
+  ASSERT_EQ(client.wait(kWait), IVIS_OK) << client.error();
+  const double last[3]{0.005 * 4999, 1, 10};
+  EXPECT_EQ(ids(client.view(last)), solved(method, last));
+  EXPECT_EQ(client.stats().bad_messages, 0U);
+}
+
+TEST_F(ClientOverTcp, AnotherSceneIsAnErrorThatNamesBothHashes) {
+  RunningServer server(scene, method);
+  auto client = connect(server.endpoint(), IVIS_POLICY_EVERYTHING, 0xabcdef);
+  EXPECT_FALSE(client);
+  EXPECT_NE(client.error().find("0000000000abcdef"), std::string::npos) << client.error();
+  char own[20];
+  std::snprintf(own, sizeof own, "%016llx", static_cast<unsigned long long>(scene.hash));
+  EXPECT_NE(client.error().find(own), std::string::npos) << client.error();
+}
+
+TEST_F(ClientOverTcp, AReachBeyondTheServersIsAnError) {
+  RunningServer server(scene, method, Reach::disc(1));
+  ivis_client_options options = ivis_client_options_default();
+  const std::string endpoint = server.endpoint();
+  options.endpoint = endpoint.c_str();
+  options.reach = "disc:2";
+  const auto client = VisibilityClient::connect(options);
+  EXPECT_FALSE(client);
+  EXPECT_NE(client.error().find("disc:2"), std::string::npos) << client.error();
+  options.reach = "disc:0.5";
+  EXPECT_STREQ(VisibilityClient::connect(options).info()->reach, "disc:0.5");
+}
+
+TEST(Client, AnAbsentServerIsAConnectionErrorThatNamesTheEndpoint) {
+  ivis_client_options options = ivis_client_options_default();
+  options.endpoint = "tcp://127.0.0.1:1";
+  options.connect_timeout_ms = 150;
+  ivis_client* client = nullptr;
+  char text[256];
+  EXPECT_EQ(ivis_client_connect(&options, &client, text, sizeof text), IVIS_ERROR_CONNECTION);
+  EXPECT_EQ(client, nullptr);
+  EXPECT_NE(std::string(text).find("tcp://127.0.0.1:1"), std::string::npos) << text;
+}
+
+TEST(Client, BadArgumentsAreNamed) {
+  const auto error_of = [](auto&& change) {
+    ivis_client_options options = ivis_client_options_default();
+    change(options);
+    ivis_client* client = nullptr;
+    char text[256] = "";
+    EXPECT_EQ(ivis_client_connect(&options, &client, text, sizeof text), IVIS_ERROR_ARGUMENT);
+    return std::string(text);
+  };
+  EXPECT_NE(error_of([](auto& o) { o.size = 3; }), "");
+  EXPECT_NE(error_of([](auto& o) { o.endpoint = "http://x"; }).find("http://x"), std::string::npos);
+  EXPECT_NE(error_of([](auto& o) { o.endpoint = nullptr; }), "");
+  EXPECT_NE(error_of([](auto& o) { o.reach = "disk:1"; }).find("disk:1"), std::string::npos);
+  EXPECT_NE(error_of([](auto& o) { o.silence_timeout_ms = 0; }), "");
+  EXPECT_NE(error_of([](auto& o) { o.policy = static_cast<ivis_policy>(3); }), "");
+  EXPECT_EQ(ivis_client_connect(nullptr, nullptr, nullptr, 0), IVIS_ERROR_ARGUMENT);
+  ivis_client_close(nullptr);
 }
 
 }  // namespace

@@ -183,6 +183,18 @@ TEST_F(Address, AStaleIpcSocketIsTakenOverAndRemovedAtTheEnd) {
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
+TEST_F(Address, ProbingLeavesNothingBehind) {
+  EXPECT_TRUE(server::probe_address(ipc));
+  EXPECT_FALSE(std::filesystem::exists(path));
+  std::string endpoint;
+  {
+    RunningServer server(scene, method);
+    endpoint = server.endpoint();
+  }
+  EXPECT_TRUE(server::probe_address(endpoint));
+  RunningServer server(scene, method, Reach::disc(1), endpoint);
+}
+
 TEST_F(Address, AFileThatIsNoSocketIsLeftAlone) {
   std::ofstream(path) << "precious";
   EXPECT_EQ(bind_error(ipc).code, ErrorCode::kConnection);

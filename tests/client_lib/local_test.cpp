@@ -1,0 +1,99 @@
+// The in-process source. No sockets here, so that ThreadSanitizer can judge it.
+
+#include "client_lib/local_source.h"
+
+#include <gtest/gtest.h>
+
+#include "client_lib/client.h"
+#include "tests/server/fake_method.h"
+
+namespace ivis::test {
+namespace {
+
+constexpr int kWait = 10'000;  // ms
+
+class LocalClient : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    client::LocalWorld world;
+    world.reach = Reach::disc(1);
+    world.catalogue = client::catalogue_of(scene, world.reach, *method);
+    world.method = method;
+    client = ivis_client_adopt_source_(client::make_local_source(world).release(), IVIS_POLICY_EVERYTHING);
+  }
+  void TearDown() override { ivis_client_close(client); }
+
+  std::vector<ObjectId> ids(const ivis_frame& frame) const {
+    std::vector<ObjectId> out;
+    for (std::uint32_t id = 0; id < frame.object_count; ++id)
+      if (ivis_frame_visible(&frame, id)) out.push_back(id);
+    return out;
+  }
+  Scene scene = grid_scene(15);
+  std::shared_ptr<NearMethod> method = std::make_shared<NearMethod>(scene);
+  ivis_client* client = nullptr;
+};
+
+TEST_F(LocalClient, GivesTheSetsOfTheMethod) {
+  for (int i = 0; i < 200; ++i) {
+    const double eye[3]{0.1 * i, 1, 12};
+    ivis_frame frame;
+    ASSERT_EQ(ivis_client_pose(client, eye), IVIS_OK);
+    ASSERT_EQ(ivis_client_wait(client, kWait), IVIS_OK);
+    ASSERT_EQ(ivis_client_view(client, eye, &frame), IVIS_OK);
+    EXPECT_EQ(frame.covered, 1);
+    EXPECT_EQ(ids(frame), method->solve({{eye[0], eye[1], eye[2]}, Reach::disc(1)})->objects);
+  }
+}
+
+TEST_F(LocalClient, FramesNeverGiveASetThatIsWrongForTheirEye) {
+  for (int i = 0; i < 20'000; ++i) {
+    const double eye[3]{0.001 * i, 1, 12};
+    ivis_frame frame;
+    ASSERT_EQ(ivis_client_frame(client, eye, &frame), IVIS_OK);
+    if (i % 100 != 0 || frame.everything != 0) continue;
+    const Vec3 centre{frame.cell_eye[0], frame.cell_eye[1], frame.cell_eye[2]};
+    EXPECT_TRUE((ViewCell{centre, Reach::disc(1)}.contains({eye[0], eye[1], eye[2]})));
+    EXPECT_EQ(ids(frame), method->solve({centre, Reach::disc(1)})->objects);
+  }
+  ivis_stats stats;
+  ivis_client_stats(client, &stats);
+  EXPECT_EQ(stats.frames, 20'000U);
+  EXPECT_LE(stats.answers, stats.poses);
+}
+
+TEST_F(LocalClient, LatestPoseWins) {
+  for (int i = 0; i < 5'000; ++i) {
+    const double eye[3]{0.001 * i, 1, 12};
+    ivis_client_pose(client, eye);
+  }
+  ASSERT_EQ(ivis_client_wait(client, kWait), IVIS_OK);
+  const double last[3]{0.001 * 4'999, 1, 12};
+  ivis_frame frame;
+  ivis_client_view(client, last, &frame);
+  EXPECT_EQ(frame.sequence, 5'000U);
+  EXPECT_EQ(frame.cell_eye[0], last[0]);
+}
+
+TEST_F(LocalClient, WhatCannotBeSolvedIsEverything) {
+  const double eye[3]{0, -60, 0};
+  ivis_frame frame;
+  ivis_client_pose(client, eye);
+  ASSERT_EQ(ivis_client_wait(client, kWait), IVIS_OK);
+  ivis_client_view(client, eye, &frame);
+  EXPECT_EQ(frame.everything, 1);
+  EXPECT_EQ(frame.visible_count, scene.object_count());
+  EXPECT_STREQ(ivis_client_error(client), "below the world");
+}
+
+TEST_F(LocalClient, ClosesWhileItSolves) {
+  for (int i = 0; i < 50; ++i) {
+    const double eye[3]{0.001 * i, 1, 12};
+    ivis_client_pose(client, eye);
+    TearDown();
+    SetUp();
+  }
+}
+
+}  // namespace
+}  // namespace ivis::test
