@@ -79,8 +79,7 @@ struct Verifier::Impl {
   RayScene rays;
   AimPoints aims;
   FreeSpace space;
-  std::vector<ObjectId> order;     // spatial: neighbours are traced together
-  std::vector<bool> sees_through;  // has triangles that do not block
+  std::vector<ObjectId> order;  // spatial: neighbours are traced together
 
   Impl(const Scene& s, const OccluderSet* occluders, BlockerChoice choice)
       : scene(s),
@@ -89,15 +88,7 @@ struct Verifier::Impl {
         rays(s, blockers),
         aims(s),
         space(s, occluders, exact),
-        order(rank_order(s)),
-        sees_through(s.objects.size()) {
-    for (std::size_t i = 0; i < s.objects.size(); ++i) {
-      const auto& primitives = s.mesh_of(s.objects[i]).primitives;
-      sees_through[i] =
-          s.objects[i].always_visible || std::any_of(primitives.begin(), primitives.end(),
-                                                     [](const Primitive& p) { return !p.opaque; });
-    }
-  }
+        order(rank_order(s)) {}
 
   /// Where ray `lane` met blocker `hit`, in double precision on the triangle itself.
   Vec3 point_on(const RayPacket& packet, int lane) const;
@@ -178,12 +169,10 @@ void Verifier::Impl::trace_chunk(const Viewpoints& from, std::span<const ObjectI
           if (solid < scene.objects.size() && wanted[solid] && state[solid] < kMaxRefuted)
             suspect(solid, viewpoint[lane], point_on(packet, i));
         }
-        // A ray that got as far as its target: the target may be seen through, or lie in the same
-        // plane as what was hit.
-        if (packet.hit[i] == RayPacket::kNothing || packet.t[i] >= 0.9999F) {
-          if (sees_through[target] || packet.hit[i] != RayPacket::kNothing)
-            suspect(target, viewpoint[lane], aim[lane].point);
-        }
+        // A ray that got as far as its target: it may be one that does not block, or lie in the
+        // same plane as what was hit.
+        if (packet.hit[i] == RayPacket::kNothing || packet.t[i] >= 0.9999F)
+          suspect(target, viewpoint[lane], aim[lane].point);
       }
     }
   }
