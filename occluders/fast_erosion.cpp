@@ -100,8 +100,9 @@ FastEroder::FastEroder(int k) : k_(k) {
 // of every wall, and a corner that looks convex may not be. The distance check finds such a result,
 // and whole capsules, which need no sides, take its place.
 std::vector<Polygon> FastEroder::erode(const Polygon& polygon, const Reach& reach) const {
-  std::vector<Polygon> result =
-      subtract(polygon.rings, Fill::kEvenOdd, taken_by(polygon, reach, false));
+  const std::vector<Ring> taken = taken_by(polygon, reach, false);
+  if (taken.empty()) return {};  // no ring has three corners
+  std::vector<Polygon> result = subtract(polygon.rings, Fill::kEvenOdd, taken);
   const bool good = std::all_of(result.begin(), result.end(), [&](const Polygon& p) {
     return within_erosion(p, polygon, reach);
   });
