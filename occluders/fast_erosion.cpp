@@ -6,6 +6,7 @@
 
 #include "core/assert.h"
 #include "occluders/clip.h"
+#include "occluders/distance_check.h"
 
 namespace ivis {
 namespace {
@@ -73,6 +74,14 @@ Ring fan(const Vec2& corner, const Vec2& n, const Vec2& m, const Shadow& v, int 
   return convex_hull(std::move(points));
 }
 
+/// corner + V whole, for outlines that do not tell which side is inside.
+Ring around(const Vec2& corner, const Reach& reach, int k) {
+  std::vector<Vec2> ring = reach.circumscribed_polygon(k);
+  for (Vec2& p : ring)
+    p += corner;
+  return ring;
+}
+
 }  // namespace
 
 FastEroder::FastEroder(int k) : k_(k) {
@@ -87,7 +96,22 @@ FastEroder::FastEroder(int k) : k_(k) {
 // set that has the corner on its border and lies between them. At a reflex corner x lies in the
 // corner + V between the walls' normals, in the fan. Strips and fans are grown by what rounding to
 // the grid may take from them.
+// Where an outline crosses or touches itself, by rounding or as given, "inside" is not on the left
+// of every wall, and a corner that looks convex may not be. The distance check finds such a result,
+// and whole capsules, which need no sides, take its place.
 std::vector<Polygon> FastEroder::erode(const Polygon& polygon, const Reach& reach) const {
+  const std::vector<Ring> taken = taken_by(polygon, reach, false);
+  if (taken.empty()) return {};  // no ring has three corners
+  std::vector<Polygon> result = subtract(polygon.rings, Fill::kEvenOdd, taken);
+  const bool good = std::all_of(result.begin(), result.end(), [&](const Polygon& p) {
+    return within_erosion(p, polygon, reach);
+  });
+  if (good) return result;
+  return subtract(polygon.rings, Fill::kEvenOdd, taken_by(polygon, reach, true));
+}
+
+std::vector<std::vector<Vec2>> FastEroder::taken_by(const Polygon& polygon, const Reach& reach,
+                                                    bool both_sides) const {
   const Reach grown = reach.grown(kGridSlackM, 0);
   const Vec3& half = grown.half_extents();
   const Shadow v{{half.x, half.z}, grown.horizontal_is_box()};
@@ -105,14 +129,18 @@ std::vector<Polygon> FastEroder::erode(const Polygon& polygon, const Reach& reac
       const Vec2& b = ring[(i + 1) % n];
       const Vec2& c = ring[(i + 2) % n];
       taken.push_back(strip(a, b, v));
+      if (both_sides) {
+        taken.push_back(strip(b, a, v));
+        taken.push_back(around(b, grown, k_));
+        continue;
+      }
       const Vec2 d = (b - a) / glm::length(b - a);
       const Vec2 e = (c - b) / glm::length(c - b);
       if (cross(d, e) <= 1e-12) taken.push_back(fan(b, {-d.y, d.x}, {-e.y, e.x}, v, k_));
     }
   }
   std::erase_if(taken, [](const Ring& r) { return r.empty(); });
-  if (taken.empty()) return {};
-  return subtract(polygon.rings, Fill::kEvenOdd, taken);
+  return taken;
 }
 
 }  // namespace ivis

@@ -16,11 +16,16 @@ namespace ivis {
 class FastEroder : public Eroder {
  public:
   /// `k`: tangents that stand for a whole turn round the ellipse, at least 4.
-  explicit FastEroder(int k = 16);
+  explicit FastEroder(int k = 24);
   const char* name() const override { return "fast"; }
   std::vector<Polygon> erode(const Polygon& polygon, const Reach& reach) const override;
 
  private:
+  /// Convex rings whose union holds all of the polygon that lies within the reach of its outline;
+  /// with `both_sides` wherever its inside is.
+  std::vector<std::vector<Vec2>> taken_by(const Polygon& polygon, const Reach& reach,
+                                          bool both_sides) const;
+
   int k_;
 };
 

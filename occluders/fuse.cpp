@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "occluders/clip.h"
+#include "occluders/progress.h"
 
 namespace ivis {
 namespace {
@@ -227,12 +228,12 @@ std::vector<FusedStack> fuse(const std::vector<Prism>& prisms, double floor,
     }
   }
   std::vector<FusedStack> stacks(groups.size());
-  std::atomic<std::size_t> done{0};
+  Progress progress(context, "fusing", groups.size());
   parallel_for(context, groups.size(), [&](std::size_t g) {
     stacks[g] =
         stack_of(prisms, groups[g],
                  bottom_kind(prisms[groups[g][0]], floor) == BottomKind::kGrounded, options);
-    context.report("fusing", ++done, groups.size());
+    progress.step();
   });
   if (context.stopped()) return {};
   return stacks;

@@ -1,10 +1,8 @@
 #include "occluders/shrink.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <mutex>
 
 #include "core/view_cell.h"
 #include "occluders/clip.h"
@@ -12,36 +10,13 @@
 #include "occluders/fuse.h"
 #include "occluders/ground.h"
 #include "occluders/prisms.h"
+#include "occluders/progress.h"
 #include "occluders/simplify.h"
 
 namespace ivis {
 namespace {
 
 constexpr double kMinAreaM2 = 0.01;
-
-/// Cheap, thread-safe progress: reports about a hundred times a stage.
-class Progress {
- public:
-  Progress(const Context& context, const char* stage, std::size_t total)
-      : context_(context),
-        stage_(stage),
-        total_(total),
-        every_(std::max<std::size_t>(1, total / 100)) {}
-  void step() {
-    const std::size_t done = ++done_;
-    if (done % every_ != 0 && done != total_) return;
-    const std::lock_guard lock(mutex_);
-    context_.report(stage_, done, total_);
-  }
-
- private:
-  const Context& context_;
-  const char* stage_;
-  const std::size_t total_;
-  const std::size_t every_;
-  std::atomic<std::size_t> done_{0};
-  std::mutex mutex_;
-};
 
 std::string describe(const Scene& scene, const Object& o) {
   const std::string& name = scene.name_of(o);

@@ -146,6 +146,22 @@ TEST(FastErosion, SplitsAtANeckAndVanishesWhenThin) {
   EXPECT_TRUE(FastEroder{}.erode(square(1.9), Reach::disc(1)).empty());
 }
 
+TEST(FastErosion, OfAnOutlineThatCrossesItselfOrRunsBackwardsStaysInside) {
+  const Reach reach = Reach::disc(1);
+  // A bow tie, a square wound the wrong way, and one with corners a tenth of a millimetre off.
+  const std::vector<Polygon> odd{
+      {{{{0, 0}, {20, 20}, {20, 0}, {0, 20}}}},
+      {{{{0, 0}, {0, 10}, {10, 10}, {10, 0}}}},
+      {{{{0, 0}, {1e-4, -1e-4}, {-1e-4, 1e-4}, {10, 0}, {10, 10}, {0, 10}}}}};
+  for (const Polygon& p : odd) {
+    const auto eroded = FastEroder{}.erode(p, reach);
+    EXPECT_FALSE(eroded.empty());
+    for (const Polygon& e : eroded)
+      EXPECT_TRUE(within_erosion(e, p, reach));
+  }
+  EXPECT_TRUE(FastEroder{}.erode({{{{0, 0}, {5, 5}}}}, reach).empty());
+}
+
 TEST(FastErosion, ByThePointKeepsAllButMicrometres) {
   const auto eroded = FastEroder{}.erode(square(10), Reach{});
   ASSERT_EQ(eroded.size(), 1U);
