@@ -186,7 +186,7 @@ std::vector<CityBlock> plan_blocks(double size, double block_m, Random& random) 
     Piece piece = std::move(stack.back());
     stack.pop_back();
     const double out = std::min(1.0, glm::length(ring_centre(piece.block.ring)) / h);
-    const double side = block_m * (1 + 0.55 * out) * random.in(0.85, 1.25);
+    const double side = block_m * (0.7 + 0.8 * out) * random.in(0.85, 1.25);
     CityBlock first;
     CityBlock second;
     if (ring_area(piece.block.ring) < 1.6 * side * side ||

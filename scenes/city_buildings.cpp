@@ -170,7 +170,9 @@ bool build_perimeter(BuiltBlock& block, double out, double frontage_m, const Hei
   // A rear house in a large court.
   const Vec2 middle = ring_centre(court);
   if (ring_area(court) > 2500 && random.chance(0.6)) {
-    CityBuilding rear = box_building(middle, sides[0].along, random.in(9, 16), random.in(5, 6.5));
+    const double half_length = random.in(9, 16);
+    const double half_depth = random.in(5, 6.5);
+    CityBuilding rear = box_building(middle, sides[0].along, half_length, half_depth);
     if (within(court, rear, 6)) {
       raise(rear, std::max<std::size_t>(2, storeys - 1), ground, random);
       block.buildings.push_back(std::move(rear));
@@ -207,10 +209,14 @@ void build_lattice(BuiltBlock& block, bool villas, double frontage_m, const Heig
   const auto storeys = static_cast<std::size_t>(villas ? 1 + random.below(3) : 4 + random.below(6));
   for (int k = -12; k <= 12; ++k) {
     for (int i = -12; i <= 12; ++i) {
-      const Vec2 at = centre + along * (step_along * (i + random.in(-0.04, 0.04))) +
-                      left_of(along) * (step_in * (k + random.in(-0.05, 0.05)));
-      CityBuilding b = box_building(at, along, length / 2 * random.in(0.85, 1.0),
-                                    depth / 2 * random.in(0.85, 1.0));
+      // One draw a statement: compilers differ in the order in which they take a call's arguments.
+      const double off_along = random.in(-0.04, 0.04);
+      const double off_in = random.in(-0.05, 0.05);
+      const double longer = random.in(0.85, 1.0);
+      const double deeper = random.in(0.85, 1.0);
+      const Vec2 at = centre + along * (step_along * (i + off_along)) +
+                      left_of(along) * (step_in * (k + off_in));
+      CityBuilding b = box_building(at, along, length / 2 * longer, depth / 2 * deeper);
       const bool skip = random.chance(villas ? 0.1 : 0.05);
       raise(b, storeys, ground, random);
       if (skip || !within(ring, b, 3)) continue;
@@ -257,7 +263,7 @@ BuiltBlock build_block(const CityBlock& block, double out, double frontage_m,
     return built;
   }
   const double pick = random.unit();
-  const double dense = 1 - 0.55 * out;  // share of blocks with houses wall to wall
+  const double dense = 1 - 0.7 * out;  // share of blocks with houses wall to wall
   if (pick < 0.08) {
     built.use = BlockUse::kPark;
     return built;

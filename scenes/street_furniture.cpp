@@ -48,8 +48,9 @@ class Furnisher {
     const Vec2 facing = length > 0.1 ? Vec2(x, z) / length : Vec2(0, 1);
     const double h = height * random_.in(0.75, 1.25);
     const bool conical = random_.chance(0.18);
-    parts_.add(conical ? Part::kTreeConical : Part::kTreeRound, at(p), facing,
-               Vec3(h * random_.in(0.85, 1.15), h, h * random_.in(0.85, 1.15)));
+    const double wide = h * random_.in(0.85, 1.15);
+    const double deep = h * random_.in(0.85, 1.15);
+    parts_.add(conical ? Part::kTreeConical : Part::kTreeRound, at(p), facing, {wide, h, deep});
     discs_.push_back({p, 0.9});
   }
   void lamp(const Vec2& p, const Vec2& to_street, double height) {

@@ -38,10 +38,19 @@ class FreeGrid {
       return false;
     return free(static_cast<std::size_t>(q.y) * nx_ + static_cast<std::size_t>(q.x));
   }
+  /// Is every cell that the segment passes free?
   bool free_between(const Vec2& a, const Vec2& b) const {
-    const auto n = static_cast<int>(glm::length(b - a) / 0.2) + 1;
-    for (int i = 0; i <= n; ++i)
-      if (!free_at(glm::mix(a, b, static_cast<double>(i) / n))) return false;
+    if (!free_at(a) || !free_at(b)) return false;
+    std::vector<double> cuts{0, 1};  // where it passes from cell to cell
+    for (int axis = 0; axis < 2; ++axis) {
+      const double from = a[axis] - lo_[axis];
+      const double to = b[axis] - lo_[axis];
+      for (double line = std::ceil(std::min(from, to)); line < std::max(from, to); ++line)
+        cuts.push_back((line - from) / (to - from));
+    }
+    std::sort(cuts.begin(), cuts.end());
+    for (std::size_t i = 0; i + 1 < cuts.size(); ++i)
+      if (!free_at(glm::mix(a, b, (cuts[i] + cuts[i + 1]) / 2))) return false;
     return true;
   }
 
@@ -315,7 +324,7 @@ Result<std::vector<Pose>> street_path(const StreetObstacles& obstacles,
     if (i + 1 >= line.size()) return line.back();
     s += step;
     const Vec2 p = line[i] + (line[i + 1] - line[i]) * (s / glm::length(line[i + 1] - line[i]));
-    // free_between looked every 0.2 m: between looks the line may clip a cell's corner.
+    // Rounding may put a point of a line along a border of cells on its other side.
     return grid.free_at(p) ? p : line[i];
   };
   std::size_t i = 0;

@@ -417,7 +417,25 @@ class WallPainter {
     chain_k_.clear();
   }
 
+  /// Is the whole chain behind what was drawn before? So are, mostly, the far walls of a court behind its front.
+  bool chain_hidden(const Height& height) const {
+    float largest = 0;
+    for (const float k : chain_k_) largest = std::max(largest, k);
+    float least = kInf;
+    for (const float k : chain_k_) least = std::min(least, k);
+    const Box box{height.top * (height.top > 0 ? largest : least), height.bottom * (height.bottom > 0 ? least : largest), largest};
+    auto first = static_cast<std::int32_t>(chain_t_.front());
+    auto last = static_cast<std::int32_t>(chain_t_.back());
+    if (last - first >= view_.bins) return false;
+    if (first >= view_.bins) {
+      first -= view_.bins;
+      last -= view_.bins;
+    }
+    return hidden_in_all<kUndersides>(map_, box, first, last, false);
+  }
+
   void draw_chain(const Height& height) {
+    if (chain_hidden(height)) return;
     const float slack = view_.slack;
     const float from = chain_t_.front();
     const float to = chain_t_.back();
@@ -640,6 +658,23 @@ void find_visible_target(const BoxTree& tree, std::uint32_t root, const float* e
   undersides ? find<true>(tree, root, eye, map, visible, stats) : find<false>(tree, root, eye, map, visible, stats);
 }
 
+// A block's statement in layer k is the weakest of its bins' statements in layer k: it holds for all of them.
+void finish_target(PolarMap& map, bool undersides) {
+  const D d;
+  const std::uint32_t blocks = map.bins() / PolarMap::kBlock;
+  for (std::uint32_t k = 0; k < kLayers; ++k)
+    for (std::uint32_t plane = 0; plane < (undersides ? 3U : 2U); ++plane) {
+      const float* from = map.slope(k) + plane * std::size_t{map.stride()};
+      float* to = map.coarse() + (3 * k + plane) * std::size_t{map.coarse_stride()};
+      for (std::uint32_t b = 0; b < blocks; ++b, from += PolarMap::kBlock) {
+        V m = hn::LoadU(d, from);
+        for (std::uint32_t l = static_cast<std::uint32_t>(hn::Lanes(d)); l < PolarMap::kBlock; l += static_cast<std::uint32_t>(hn::Lanes(d)))
+          m = plane == 2 ? hn::Max(m, hn::LoadU(d, from + l)) : hn::Min(m, hn::LoadU(d, from + l));
+        to[b] = hn::GetLane(plane == 2 ? hn::MaxOfLanes(d, m) : hn::MinOfLanes(d, m));
+      }
+    }
+}
+
 const char* target_name() { return hwy::TargetName(HWY_TARGET); }
 
 }  // namespace
@@ -652,6 +687,7 @@ namespace ivis {
 HWY_EXPORT(draw_walls_target);
 HWY_EXPORT(find_visible_target);
 HWY_EXPORT(find_children_target);
+HWY_EXPORT(finish_target);
 HWY_EXPORT(target_name);
 
 PolarMap::PolarMap(std::uint32_t bins_a_face)
@@ -679,21 +715,8 @@ void PolarMap::repeat_pad() {
   }
 }
 
-// A block's statement in layer k is the weakest of its bins' statements in layer k: it holds for all of them.
 void PolarMap::finish(bool undersides) {
-  const std::uint32_t blocks = bins_ / kBlock;
-  for (std::uint32_t p = 0; p < 3 * kLayers; ++p) {
-    const bool largest = p % 3 == 2;
-    if (largest && !undersides) continue;
-    const float* plane = data_.data() + p * std::size_t{stride_};
-    float* coarse = coarse_.data() + p * std::size_t{coarse_stride_};
-    for (std::uint32_t b = 0; b < blocks; ++b) {
-      const float* bin = plane + std::size_t{b} * kBlock;
-      float m = bin[0];
-      for (std::uint32_t i = 1; i < kBlock; ++i) m = largest ? (bin[i] > m ? bin[i] : m) : (bin[i] < m ? bin[i] : m);
-      coarse[b] = m;
-    }
-  }
+  HWY_DYNAMIC_DISPATCH(finish_target)(*this, undersides);
 }
 
 void draw_walls(const WallSet& walls, const float eye[3], const Floors& floors, std::span<const std::uint32_t> only,
