@@ -256,8 +256,8 @@ HWY_INLINE void add_layer(PolarMap& map, std::size_t at, D d, M lanes, V s, V w,
     float* ps = map.slope(k) + at;
     float* pw = map.near_inverse(k) + at;
     float* pb = map.low(k) + at;
-    const V os = hn::LoadU(d, ps);
-    const V ow = hn::LoadU(d, pw);
+    const V os = hn::Load(d, ps);
+    const V ow = hn::Load(d, pw);
     const M higher = hn::Gt(cs, os);
     V hs = hn::IfThenElse(higher, cs, os);
     V hw = hn::IfThenElse(higher, cw, ow);
@@ -265,7 +265,7 @@ HWY_INLINE void add_layer(PolarMap& map, std::size_t at, D d, M lanes, V s, V w,
     cw = hn::IfThenElse(higher, ow, cw);
     M dominated = hn::Ge(hw, cw);
     if constexpr (kUndersides) {
-      const V ob = hn::LoadU(d, pb);
+      const V ob = hn::Load(d, pb);
       V hb = hn::IfThenElse(higher, cb, ob);
       cb = hn::IfThenElse(higher, ob, cb);
       // Two walls whose slopes overlap block their union, for what lies behind both.
@@ -277,11 +277,11 @@ HWY_INLINE void add_layer(PolarMap& map, std::size_t at, D d, M lanes, V s, V w,
       hb = hn::IfThenElse(extend_high, both, hb);
       cs = hn::IfThenElse(extend_low, hs, cs);
       dominated = hn::And(dominated, hn::Le(hb, cb));
-      hn::StoreU(hb, d, pb);
+      hn::Store(hb, d, pb);
       cb = hn::IfThenElse(dominated, hn::Set(d, kInf), cb);
     }
-    hn::StoreU(hs, d, ps);
-    hn::StoreU(hw, d, pw);
+    hn::Store(hs, d, ps);
+    hn::Store(hw, d, pw);
     cs = hn::IfThenElse(dominated, hn::Set(d, -kInf), cs);
     cw = hn::IfThenElse(dominated, hn::Zero(d), cw);
   }
@@ -443,86 +443,73 @@ class WallPainter {
     const auto first = static_cast<std::int32_t>(std::ceil(from + reach_in));
     const auto last = static_cast<std::int32_t>(std::floor(to - reach_in)) - 1;
     if (last < first || last - first >= view_.bins) return;
-    const std::int32_t base = first - 2;  // scratch element of bin i: i - base
-    const auto length = static_cast<std::size_t>(last - first) + 4 + 2 * kW;
-    if (least_.size() < length) {
-      least_.resize(length);
-      largest_.resize(length);
+    pieces_.clear();
+    for (std::size_t p = 0; p + 1 < chain_t_.size(); ++p) {
+      const float ta = chain_t_[p];
+      const float tb = chain_t_[p + 1];
+      const float ka = chain_k_[p];
+      const float kb = chain_k_[p + 1];
+      pieces_.push_back({ta, tb, ka, tb > ta ? (kb - ka) / (tb - ta) : 0.0F, std::min(ka, kb), std::max(ka, kb),
+                         static_cast<std::int32_t>(std::floor(ta - slack)), static_cast<std::int32_t>(std::floor(tb + slack))});
     }
-    std::fill_n(least_.begin(), length, kInf);
-    std::fill_n(largest_.begin(), length, 0.0F);
-    for (std::size_t p = 0; p + 1 < chain_t_.size(); ++p)
-      range_of_piece(chain_t_[p], chain_t_[p + 1], chain_k_[p], chain_k_[p + 1], first, last, base);
-    write(first, last, base, height);
+    write(first, last, height);
   }
 
-  /// Adds one linear piece to the least and largest k of the bins it touches.
-  void range_of_piece(float ta, float tb, float ka, float kb, std::int32_t first, std::int32_t last, std::int32_t base) {
+  /// A stretch of chain on which k is linear; it touches the bins first..last.
+  struct Piece {
+    float ta, tb;
+    float ka;
+    float rate;  ///< of k, a bin
+    float low_k, high_k;
+    std::int32_t first, last;
+  };
+
+  /// Least and largest k of a piece over the bins from `at` on, which it touches where `in` is set.
+  HWY_INLINE void range_over(const Piece& piece, std::int32_t at, V& least, V& largest) const {
     const D d;
     const DI di;
-    const float slack = view_.slack;
-    const std::int32_t i0 = std::max(first, static_cast<std::int32_t>(std::floor(ta - slack)));
-    const std::int32_t i1 = std::min(last, static_cast<std::int32_t>(std::floor(tb + slack)));
-    const float rate = tb > ta ? (kb - ka) / (tb - ta) : 0.0F;
-    const float low_k = std::min(ka, kb);
-    const float high_k = std::max(ka, kb);
-    const V doubt = hn::Set(d, kRelative * high_k);
-    const V vta = hn::Set(d, ta);
-    const V vtb = hn::Set(d, tb);
-    const V vlow = hn::Set(d, low_k);
-    const V vhigh = hn::Set(d, high_k);
-    const V vrate = hn::Set(d, rate);
-    const V vka = hn::Set(d, ka);
-    const float before = guards_.least_over_bin ? -slack : 0.5F;
-    const float after = guards_.least_over_bin ? 1 + slack : 0.5F;
-    for (std::int32_t i = i0; i <= i1; i += static_cast<std::int32_t>(hn::Lanes(d))) {
-      const V t = hn::ConvertTo(d, hn::Iota(di, i));
-      const V t0 = hn::Min(hn::Max(hn::Add(t, hn::Set(d, before)), vta), vtb);
-      const V t1 = hn::Min(hn::Max(hn::Add(t, hn::Set(d, after)), vta), vtb);
-      const V k0 = hn::Add(vka, hn::Mul(hn::Sub(t0, vta), vrate));
-      const V k1 = hn::Add(vka, hn::Mul(hn::Sub(t1, vta), vrate));
-      const V low = hn::Max(hn::Sub(hn::Min(k0, k1), doubt), vlow);
-      const V high = hn::Min(hn::Add(hn::Max(k0, k1), doubt), vhigh);
-      const auto mine = hn::RebindMask(d, hn::Lt(hn::Iota(di, i), hn::Set(di, i1 + 1)));
-      float* l = least_.data() + (i - base);
-      float* h = largest_.data() + (i - base);
-      const V ol = hn::LoadU(d, l);
-      const V oh = hn::LoadU(d, h);
-      hn::StoreU(hn::IfThenElse(mine, hn::Min(ol, low), ol), d, l);
-      hn::StoreU(hn::IfThenElse(mine, hn::Max(oh, high), oh), d, h);
-    }
+    const float before = guards_.least_over_bin ? -view_.slack : 0.5F;
+    const float after = guards_.least_over_bin ? 1 + view_.slack : 0.5F;
+    const auto bin = hn::Add(hn::Iota(di, 0), hn::Set(di, at));
+    const V t = hn::ConvertTo(d, bin);
+    const V ta = hn::Set(d, piece.ta);
+    const V tb = hn::Set(d, piece.tb);
+    const V rate = hn::Set(d, piece.rate);
+    const V ka = hn::Set(d, piece.ka);
+    const V doubt = hn::Set(d, kRelative * piece.high_k);
+    const V t0 = hn::Min(hn::Max(hn::Add(t, hn::Set(d, before)), ta), tb);
+    const V t1 = hn::Min(hn::Max(hn::Add(t, hn::Set(d, after)), ta), tb);
+    const V k0 = hn::Add(ka, hn::Mul(hn::Sub(t0, ta), rate));
+    const V k1 = hn::Add(ka, hn::Mul(hn::Sub(t1, ta), rate));
+    const V low = hn::Max(hn::Sub(hn::Min(k0, k1), doubt), hn::Set(d, piece.low_k));
+    const V high = hn::Min(hn::Add(hn::Max(k0, k1), doubt), hn::Set(d, piece.high_k));
+    const auto in = hn::RebindMask(d, hn::And(hn::Gt(bin, hn::Set(di, piece.first - 1)), hn::Lt(bin, hn::Set(di, piece.last + 1))));
+    least = hn::IfThenElse(in, hn::Min(least, low), least);
+    largest = hn::IfThenElse(in, hn::Max(largest, high), largest);
   }
 
-  void write(std::int32_t first, std::int32_t last, std::int32_t base, const Height& height) {
-    if (first >= view_.bins) {
-      first -= view_.bins;
-      last -= view_.bins;
-      base -= view_.bins;
-    }
-    if (first < 0) {
-      first += view_.bins;
-      last += view_.bins;
-      base += view_.bins;
-    }
-    write_run(first, std::min(last, view_.bins - 1), base, height);
-    if (last >= view_.bins) write_run(0, last - view_.bins, base - view_.bins, height);
-  }
-
-  void write_run(std::int32_t first, std::int32_t last, std::int32_t base, const Height& height) {
+  /// Writes the bins first..last, vector by vector at aligned places; bins past the end wrap.
+  void write(std::int32_t first, std::int32_t last, const Height& height) {
     const D d;
     const DI di;
+    const auto lanes = static_cast<std::int32_t>(hn::Lanes(d));
     const V top = hn::Set(d, height.top);
     const V bottom = hn::Set(d, height.bottom);
     const V guard = hn::Set(d, kRelative);
     const bool top_by_least = height.top >= 0 || !guards_.far_end_below_eye;
-    for (std::int32_t i = first; i <= last; i += static_cast<std::int32_t>(hn::Lanes(d))) {
-      const V least = hn::LoadU(d, least_.data() + (i - base));
-      const V largest = hn::LoadU(d, largest_.data() + (i - base));
+    std::size_t p0 = 0;
+    bool pad = false;
+    for (std::int32_t at = first & ~(lanes - 1); at <= last; at += lanes) {
+      V least = hn::Set(d, kInf);
+      V largest = hn::Zero(d);
+      while (p0 < pieces_.size() && pieces_[p0].last < at) ++p0;
+      for (std::size_t p = p0; p < pieces_.size() && pieces_[p].first < at + lanes; ++p) range_over(pieces_[p], at, least, largest);
       V s = hn::Mul(top, top_by_least ? least : largest);
       s = hn::Sub(s, hn::Mul(hn::Abs(s), guard));
       V w = hn::Sub(least, hn::Mul(least, guard));
       if (!guards_.test_distance) w = hn::Set(d, kInf);
-      auto mine = hn::RebindMask(d, hn::Lt(hn::Iota(di, i), hn::Set(di, last + 1)));
+      const auto bin = hn::Add(hn::Iota(di, 0), hn::Set(di, at));
+      auto mine = hn::RebindMask(d, hn::And(hn::Gt(bin, hn::Set(di, first - 1)), hn::Lt(bin, hn::Set(di, last + 1))));
       V b = hn::Set(d, -kInf);
       if constexpr (kUndersides) {
         if (height.bottom > -kInf && guards_.respect_undersides) {
@@ -531,9 +518,11 @@ class WallPainter {
           mine = hn::And(mine, hn::Lt(b, s));
         }
       }
-      add_layer<kUndersides>(map_, static_cast<std::size_t>(i), d, mine, s, w, b);
+      const std::int32_t to = at & (view_.bins - 1);
+      add_layer<kUndersides>(map_, static_cast<std::size_t>(to), d, mine, s, w, b);
+      pad = pad || to < static_cast<std::int32_t>(PolarMap::kPad);
     }
-    if (first < static_cast<std::int32_t>(PolarMap::kPad)) map_.repeat_pad();
+    if (pad) map_.repeat_pad();
   }
 
   PolarMap& map_;
@@ -543,7 +532,7 @@ class WallPainter {
   float face_;
   Corners corners_;
   std::vector<float> chain_t_, chain_k_;
-  std::vector<float> least_, largest_;
+  std::vector<Piece> pieces_;
 };
 
 View make_view(const float eye[3], const PolarMap& map) {
@@ -696,8 +685,8 @@ PolarMap::PolarMap(std::uint32_t bins_a_face)
       coarse_stride_(bins_ / kBlock + kBlock + 16) {
   IVIS_ASSERT(std::has_single_bit(bins_a_face) && bins_a_face >= 64 && bins_a_face <= 8192,
               "bins a face: a power of two from 64 to 8192");
-  data_.resize(std::size_t{3} * kLayers * stride_);
-  coarse_.resize(std::size_t{3} * kLayers * coarse_stride_);
+  data_.resize(std::size_t{3} * kLayers * stride_ / 16);
+  coarse_.resize(std::size_t{3} * kLayers * coarse_stride_ / 16 + 1);
 }
 
 void PolarMap::clear() {
@@ -710,7 +699,7 @@ void PolarMap::clear() {
 
 void PolarMap::repeat_pad() {
   for (std::uint32_t p = 0; p < 3 * kLayers; ++p) {
-    float* plane = data_.data() + p * std::size_t{stride_};
+    float* plane = slope(0) + p * std::size_t{stride_};
     std::copy_n(plane, kPad, plane + bins_);
   }
 }

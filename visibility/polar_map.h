@@ -45,7 +45,7 @@ struct WallSet {
 /// Threads: one writer; readers only after finish().
 class PolarMap {
  public:
-  static constexpr std::uint32_t kLayers = 3;
+  static constexpr std::uint32_t kLayers = 2;
   static constexpr std::uint32_t kBlock = 16;  ///< bins that share coarse minima
   static constexpr std::uint32_t kPad = 64;    ///< bins repeated behind the last, so that short runs do not wrap
 
@@ -62,22 +62,25 @@ class PolarMap {
   std::uint32_t bins() const { return bins_; }
   std::uint32_t bins_a_face() const { return bins_ / 4; }
   std::uint32_t stride() const { return stride_; }
-  float* slope(std::uint32_t layer) { return data_.data() + layer * std::size_t{3} * stride_; }
+  float* slope(std::uint32_t layer) { return data_[0].v + layer * std::size_t{3} * stride_; }
   float* near_inverse(std::uint32_t layer) { return slope(layer) + stride_; }
   float* low(std::uint32_t layer) { return slope(layer) + 2 * std::size_t{stride_}; }
-  const float* slope(std::uint32_t layer) const { return data_.data() + layer * std::size_t{3} * stride_; }
+  const float* slope(std::uint32_t layer) const { return data_[0].v + layer * std::size_t{3} * stride_; }
   const float* near_inverse(std::uint32_t layer) const { return slope(layer) + stride_; }
   const float* low(std::uint32_t layer) const { return slope(layer) + 2 * std::size_t{stride_}; }
-  float* coarse() { return coarse_.data(); }
-  const float* coarse() const { return coarse_.data(); }
+  float* coarse() { return coarse_[0].v; }
+  const float* coarse() const { return coarse_[0].v; }
   std::uint32_t coarse_stride() const { return coarse_stride_; }
 
  private:
   std::uint32_t bins_;
-  std::uint32_t stride_;         ///< floats a plane: bins + pad, off powers of two
+  std::uint32_t stride_;         ///< floats a plane: bins + pad, a multiple of 16 off powers of two
   std::uint32_t coarse_stride_;  ///< floats a coarse plane
-  std::vector<float> data_;      ///< kLayers x (S, W, B) planes
-  std::vector<float> coarse_;    ///< likewise over blocks of kBlock bins
+  struct alignas(64) Line {
+    float v[16];
+  };
+  std::vector<Line> data_;    ///< kLayers x (S, W, B) planes, each at a cache line
+  std::vector<Line> coarse_;  ///< likewise over blocks of kBlock bins
 };
 
 /// Which solids reach down without end for the cell at hand (occluders/occluder_set.h, extends_down).
