@@ -7,7 +7,9 @@
 #include <csignal>
 #include <cstdio>
 #include <ctime>
+#include <iomanip>
 #include <iostream>
+#include <sstream>
 
 #include <unistd.h>
 
@@ -56,7 +58,14 @@ Context make_context(bool quiet) {
   return context;
 }
 
-void print(const Json& json) { std::cout << json.dump() << '\n'; }
+// Names in a scene need not be UTF-8.
+void print(const Json& json) { std::cout << json.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n'; }
+
+std::string hex(SceneHash hash) {
+  std::ostringstream out;
+  out << std::hex << std::setw(16) << std::setfill('0') << hash;
+  return out.str();
+}
 Json to_json(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
 
 Result<Vec3> parse_point(const std::string& text) {

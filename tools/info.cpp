@@ -1,18 +1,10 @@
-#include <iomanip>
 #include <iostream>
 #include <memory>
-#include <sstream>
 
 #include "tools/common.h"
 
 namespace ivis::tool {
 namespace {
-
-std::string hex(SceneHash hash) {
-  std::ostringstream out;
-  out << std::hex << std::setw(16) << std::setfill('0') << hash;
-  return out.str();
-}
 
 struct Args {
   SceneArgs scene;

@@ -2,7 +2,9 @@
 
 #include <iostream>
 #include <memory>
+#include <numeric>
 
+#include "client_lib/record.h"
 #include "tools/common.h"
 
 namespace ivis::tool {
@@ -53,13 +55,20 @@ class Summary {
   std::vector<double> pvs_, seen_, ratio_;
 };
 
-Outcome run(const Args& args) {
-  const Context context = make_context(args.json);
-  Context quiet = context;
-  quiet.progress = nullptr;
+/// Progress of cells, not of each cell's rays.
+Context without_progress(Context context) {
+  context.progress = nullptr;
+  return context;
+}
+
+VerifyOptions verify_options(const Args& args) {
   VerifyOptions options;
   options.rays_per_culled_object = args.rays;
   options.seed = args.seed;
+  return options;
+}
+
+Outcome verify_path(const Args& args, const Context& context) {
   const auto reach = args.solve.parse_reach();
   if (!reach) return reach.error();
   const auto path = read_path(args.path);
@@ -75,12 +84,46 @@ Outcome run(const Args& args) {
   for (std::size_t row = 0; row < path->size(); row += args.stride) {
     const auto pvs = (*method)->solve({(*path)[row].eye, *reach});
     if (!pvs) return pvs.error();
-    const auto report = verifier.check(*pvs, options, quiet);
+    const auto report = verifier.check(*pvs, verify_options(args), without_progress(context));
     if (!report) return report.error();
     summary.add(*report);
     context.report("verify", std::min(row + args.stride, path->size()), path->size());
   }
   return summary.report(args.json);
+}
+
+/// A covered frame was promised for its whole cell, an uncovered one was drawn from its eye alone.
+Outcome verify_record(const Args& args, const Context& context) {
+  const auto record = client::read_record(args.record);
+  if (!record) return record.error();
+  const auto scene = args.scene.load(context);
+  if (!scene) return scene.error();
+  if (scene->hash != record->scene_hash)
+    return mismatch("'" + args.record.string() + "' was recorded with scene " + hex(record->scene_hash) + ", '" +
+                    args.scene.file.string() + "' is " + hex(scene->hash));
+  const auto occluders = args.solve.get_occluders(*scene, record->reach, context);
+  if (!occluders) return occluders.error();
+  const Verifier verifier(*scene, &*occluders);
+  Summary summary;
+  for (std::size_t row = 0; row < record->frames.size(); row += args.stride) {
+    const client::RecordedFrame& frame = record->frames[row];
+    Pvs pvs = frame.pvs;
+    if (!frame.covered) pvs.cell = {frame.eye, Reach::ball(0)};
+    if (frame.everything) {
+      pvs.objects.resize(scene->objects.size());
+      std::iota(pvs.objects.begin(), pvs.objects.end(), 0U);
+    }
+    const auto report = verifier.check(pvs, verify_options(args), without_progress(context));
+    if (!report) return report.error();
+    summary.add(*report);
+    context.report("verify", std::min(row + args.stride, record->frames.size()), record->frames.size());
+  }
+  return summary.report(args.json);
+}
+
+Outcome run(const Args& args) {
+  const Context context = make_context(args.json);
+  return args.record.empty() ? verify_path(args, context) : verify_record(args, context);
 }
 
 }  // namespace
