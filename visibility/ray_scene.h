@@ -26,7 +26,7 @@ struct RayPacket {
 /// Guarantee: none: a ray may slip between triangles or meet one that it should pass by; confirm
 ///            by exact_segment.h.
 /// Threads:   const and reentrant. Ownership: keeps nothing of scene and blockers.
-/// Cost:      about 200 bytes a triangle.
+/// Cost:      about 100 bytes a triangle.
 class RayScene {
  public:
   RayScene(const Scene& scene, const Blockers& blockers);
