@@ -38,7 +38,8 @@ struct NetworkSource::Impl {
   explicit Impl(const NetworkOptions& o)
       : options(o), scene_hash(o.scene_hash), context(1), socket(context, zmq::socket_type::dealer) {
     socket.set(zmq::sockopt::linger, 100);       // ms, for Bye
-    socket.set(zmq::sockopt::immediate, true);   // nothing is queued for a server that is not there
+    // Not ZMQ_IMMEDIATE: it would drop a farewell that is followed at once by the disconnect. So a few
+    // messages may wait for a server that is not there; it answers only the latest.
     socket.set(zmq::sockopt::sndhwm, 8);
     socket.set(zmq::sockopt::rcvhwm, 256);
     socket.set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(wire::kMaxMessageBytes));
@@ -46,7 +47,7 @@ struct NetworkSource::Impl {
     socket.set(zmq::sockopt::reconnect_ivl_max, 1000);
     socket.set(zmq::sockopt::heartbeat_ivl, 2000);
     socket.set(zmq::sockopt::heartbeat_timeout, 6000);
-    socket.set(zmq::sockopt::ipv6, true);
+    socket.set(zmq::sockopt::ipv6, options.endpoint.find('[') != std::string::npos);  // tcp://[::1]:7447
     socket.connect(options.endpoint);
   }
 

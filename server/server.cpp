@@ -58,7 +58,7 @@ struct Server::Impl {
     socket.set(zmq::sockopt::linger, 500);  // ms, for the farewells
     socket.set(zmq::sockopt::heartbeat_ivl, 2000);
     socket.set(zmq::sockopt::heartbeat_timeout, 10000);
-    socket.set(zmq::sockopt::ipv6, true);
+    socket.set(zmq::sockopt::ipv6, options.listen.find('[') != std::string::npos);  // tcp://[::1]:7447
   }
 
   /// Takes in what waits; a bound keeps a flood of messages from starving the answers.
@@ -155,7 +155,7 @@ Status probe_address(const std::string& listen) {
     zmq::context_t context(1);
     zmq::socket_t socket(context, zmq::socket_type::router);
     socket.set(zmq::sockopt::linger, 0);
-    socket.set(zmq::sockopt::ipv6, true);
+    socket.set(zmq::sockopt::ipv6, listen.find('[') != std::string::npos);
     socket.bind(listen);
     remove_ipc_file(socket.get(zmq::sockopt::last_endpoint));
     return ok();
