@@ -216,7 +216,8 @@ std::vector<std::byte> SessionTable::answer(Session& session) {
 }
 
 std::size_t SessionTable::remembered_limit() const {
-  const std::size_t each = sizeof(Remembered) + nothing_.set.words.size() * 8;
+  // A state holds two sets (wire/pvs_codec.h) and the model.
+  const std::size_t each = sizeof(Remembered) + 2 * nothing_.set.words.size() * 8;
   return std::max<std::size_t>(2, std::min(limits_.remembered_sets, limits_.remembered_bytes / each));
 }
 
