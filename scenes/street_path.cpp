@@ -161,7 +161,8 @@ class Router {
     reach(start, start, 0);
     const std::size_t nx = grid_.nx();
     while (!open.empty()) {
-      const auto [estimate, cell] = open.top();
+      const float estimate = open.top().first;
+      const std::size_t cell = open.top().second;
       open.pop();
       if (cell == goal) break;
       const float left = static_cast<float>(glm::length(grid_.centre(goal) - grid_.centre(cell)));
