@@ -1,6 +1,7 @@
 #include "server/address.h"
 
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <string_view>
 #include <system_error>
@@ -32,10 +33,21 @@ Listener who_listens(const std::string& path) {
   return reason == ECONNREFUSED || reason == ENOENT ? Listener::kNone : Listener::kUnknown;
 }
 
+/// ZeroMQ takes a port modulo 65,536 without a word.
+Status check_port(const std::string& endpoint) {
+  const std::string port = endpoint.substr(endpoint.rfind(':') + 1);
+  if (port == "*") return ok();
+  unsigned value = 0;
+  const auto parsed = std::from_chars(port.data(), port.data() + port.size(), value);
+  if (parsed.ec != std::errc{} || parsed.ptr != port.data() + port.size() || value > 65535)
+    return invalid_argument("'" + endpoint + "': found port '" + port + "', expected 0 to 65535 or *");
+  return ok();
+}
+
 }  // namespace
 
 Status claim_address(const std::string& endpoint) {
-  if (endpoint.starts_with(kTcp)) return ok();
+  if (endpoint.starts_with(kTcp)) return check_port(endpoint);
   if (!endpoint.starts_with(kIpc))
     return invalid_argument("'" + endpoint + "' is not an address, expected tcp://HOST:PORT or ipc://PATH");
   const std::string path = endpoint.substr(kIpc.size());

@@ -130,7 +130,9 @@ void SolveArgs::add_to(CLI::App& app, bool reach_required) {
   if (reach_required) option->required();
   std::string methods;
   for (const auto& t : method_list()) methods += (methods.empty() ? "" : "; ") + t.name + ": " + t.summary;
-  app.add_option("--method", method, methods)->capture_default_str()->type_name("M");
+  std::vector<std::string> names;
+  for (const auto& t : method_list()) names.push_back(t.name);
+  app.add_option("--method", method, methods)->capture_default_str()->type_name("M")->check(CLI::IsMember(names));
   app.add_option("--map", map, "sampling of the cull map")->capture_default_str()->check(CLI::IsMember({"polar", "orthographic"}));
   app.add_option("--occluders", occluders, "shrunk occluders, made by 'ivis shrink' (default: shrink now)")->type_name("F.ivo");
   app.add_option("--threads", threads, "threads of one solve; the result does not depend on it")->capture_default_str()->check(CLI::Range(1, 256));

@@ -95,6 +95,7 @@ Polygon lit(const OccluderSet& set, const Vec3& apex, double far) {
 }
 
 Outcome run(const Args& args) {
+  if (args.out.extension() != ".svg") return invalid_argument("'" + args.out.string() + "': pictures are SVG, expected a name that ends in .svg");
   const auto reach = args.solve.parse_reach();
   if (!reach) return reach.error();
   const auto eye = parse_point(args.eye);

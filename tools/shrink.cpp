@@ -42,6 +42,7 @@ Outcome run(const Args& args) {
   const auto shrunk = shrink(*scene, options, *eroder, context);
   if (!shrunk) return shrunk.error();
   if (auto s = write_occluders(args.out, shrunk->set); !s) return s.error();
+  if (shrunk->set.shrunk.empty()) std::cerr << "warning: no occluder is left for this reach: every PVS will list everything\n";
   const ShrinkReport& r = shrunk->report;
   if (args.json) {
     Json left_out = Json::object();
@@ -52,7 +53,7 @@ Outcome run(const Args& args) {
   }
   std::cout << r.occluders_in << " objects -> " << r.occluders_out << " shrunk prisms in " << r.seconds << " s ("
             << eroder->name() << " builder), " << 100 * r.volume_kept() << " % of the solids' volume kept\n";
-  for (const auto& [reason, count] : r.left_out) std::cout << "  left out: " << count << "  " << reason << '\n';
+  for (const auto& [reason, count] : r.left_out) std::cout << "  not taken: " << count << "  " << reason << '\n';
   std::cout << "written: " << args.out.string() << '\n';
   return kOk;
 }

@@ -18,6 +18,7 @@ struct Args {
   std::size_t rays = 64;
   std::size_t stride = 1;
   std::uint64_t seed = 1;
+  bool strict = false;
   bool json = false;
 };
 
@@ -61,6 +62,8 @@ Context without_progress(Context context) {
   return context;
 }
 
+BlockerChoice blockers(const Args& args) { return args.strict ? BlockerChoice::kOccluding : BlockerChoice::kDrawn; }
+
 VerifyOptions verify_options(const Args& args) {
   VerifyOptions options;
   options.rays_per_culled_object = args.rays;
@@ -79,7 +82,7 @@ Outcome verify_path(const Args& args, const Context& context) {
   if (!occluders) return occluders.error();
   const auto method = args.solve.make(*scene, *occluders);
   if (!method) return method.error();
-  const Verifier verifier(*scene, &*occluders);
+  const Verifier verifier(*scene, &*occluders, blockers(args));
   Summary summary;
   for (std::size_t row = 0; row < path->size(); row += args.stride) {
     const auto pvs = (*method)->solve({(*path)[row].eye, *reach});
@@ -103,7 +106,7 @@ Outcome verify_record(const Args& args, const Context& context) {
                     args.scene.file.string() + "' is " + hex(scene->hash));
   const auto occluders = args.solve.get_occluders(*scene, record->reach, context);
   if (!occluders) return occluders.error();
-  const Verifier verifier(*scene, &*occluders);
+  const Verifier verifier(*scene, &*occluders, blockers(args));
   Summary summary;
   for (std::size_t row = 0; row < record->frames.size(); row += args.stride) {
     const client::RecordedFrame& frame = record->frames[row];
@@ -137,6 +140,7 @@ void add_verify(CLI::App& app, std::function<Outcome()>& action) {
   sub->add_option("--record", args->record, "what a client was told, recorded by 'ivis walk --record'")->excludes(path);
   sub->add_option("--rays", args->rays, "aimed rays a culled object")->capture_default_str()->check(CLI::Range(1, 1000000));
   sub->add_option("--stride", args->stride, "every K-th pose")->capture_default_str()->check(CLI::Range(1, 1000000000));
+  sub->add_flag("--strict", args->strict, "see through nodes tagged 'never', which no method takes as occluders: finds more, proves more");
   sub->add_option("--seed", args->seed, "of the rays")->capture_default_str();
   sub->add_flag("--json", args->json, "print JSON");
   sub->callback([&action, args] {
