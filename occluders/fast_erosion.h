@@ -8,7 +8,6 @@ namespace ivis {
 /// its inside, every reflex corner a fan of tangents to the reach, in one boolean difference on an
 /// integer grid. Guarantee: the result lies inside the true erosion, by about 6 micrometres at
 /// walls. Threads:   const and reentrant. Cost:      near linear in edges for footprints;
-/// bench/erosion_bench.cpp. Source:    Wonka, Wimmer, Sillion 2001, section 5.3. Departs: subtracts
 /// the enlarged boundary instead of the enlarged, triangulated exterior: the same
 ///            set for a connected reach that contains 0. Of each edge's capsule only the part
 ///            inside the polygon that no neighbour covers: convex corners stay sharp, and walls

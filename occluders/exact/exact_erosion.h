@@ -15,7 +15,7 @@ namespace ivis {
 ///            round, which overstep by a factor of at most 1 / cos(pi / k) at reflex corners.
 /// Errors:    none; a polygon that CGAL refuses comes back empty. Any rings do: they fill even-odd.
 /// Threads:   const and reentrant.
-/// Cost:      about 3 ms a footprint; bench/erosion_bench.cpp
+/// Cost:      about 3 ms a footprint;
 /// Source:    the sum is CGAL's minkowski_sum_2 (reduced convolution).
 class ExactEroder : public Eroder {
  public:
