@@ -28,7 +28,7 @@ class Footprints {
     if (family == "courtyards") return placed(courtyard());
     if (family == "necks") return placed({neck()});
     if (family == "stars") return placed({star()});
-    if (family == "dirty") return placed({dirty(ell())});
+    if (family == "dirty") return largest(placed({dirty(ell())}).rings);
     if (family == "blocks") return block();
     return {};
   }
@@ -117,7 +117,12 @@ class Footprints {
         p = turned(p, angle + in(-0.02, 0.02) * (i % 3));
       houses.push_back(house);
     }
-    std::vector<Polygon> pieces = unite(houses, Fill::kNonZero);
+    return largest(houses);
+  }
+  /// United, as the shrinker does before it erodes: corners moved by a hair may make rings cross
+  /// themselves, and an eroder may rely on simple ones.
+  static Polygon largest(const std::vector<Ring>& rings) {
+    std::vector<Polygon> pieces = unite(rings, Fill::kNonZero);
     return *std::max_element(pieces.begin(), pieces.end(),
                              [](const Polygon& p, const Polygon& q) { return area(p) < area(q); });
   }
