@@ -13,7 +13,9 @@ using ivis::client::copy_text;
 
 namespace {
 
-ivis::Vec3 vec(const double p[3]) { return {p[0], p[1], p[2]}; }
+ivis::Vec3 vec(const double p[3]) {
+  return {p[0], p[1], p[2]};
+}
 
 /// Out of memory is all that may be thrown inside; the caller is C.
 template <class F>
@@ -43,8 +45,8 @@ ivis_client_options ivis_client_options_default(void) {
   return o;
 }
 
-ivis_status ivis_client_connect(const ivis_client_options* options, ivis_client** client, char* error,
-                                size_t error_size) {
+ivis_status ivis_client_connect(const ivis_client_options* options, ivis_client** client,
+                                char* error, size_t error_size) {
   if (client == nullptr) return IVIS_ERROR_ARGUMENT;
   *client = nullptr;
   const auto refuse = [&](ivis_status status, const std::string& text) {
@@ -56,7 +58,8 @@ ivis_status ivis_client_connect(const ivis_client_options* options, ivis_client*
       return refuse(IVIS_ERROR_ARGUMENT, "options were not made by ivis_client_options_default()");
     if (options->endpoint == nullptr) return refuse(IVIS_ERROR_ARGUMENT, "no endpoint");
     if (options->policy < IVIS_POLICY_EVERYTHING || options->policy > IVIS_POLICY_INCOMPLETE)
-      return refuse(IVIS_ERROR_ARGUMENT, "unknown policy " + std::to_string(static_cast<int>(options->policy)));
+      return refuse(IVIS_ERROR_ARGUMENT,
+                    "unknown policy " + std::to_string(static_cast<int>(options->policy)));
     if (options->connect_timeout_ms < 0 || options->silence_timeout_ms <= 0)
       return refuse(IVIS_ERROR_ARGUMENT, "a timeout is negative or zero");
     ivis::client::NetworkOptions network;
@@ -68,7 +71,9 @@ ivis_status ivis_client_connect(const ivis_client_options* options, ivis_client*
     if (!source) return refuse(ivis::client::status_of(source.error()), source.error().message);
     auto made = std::make_unique<ivis_client>(std::move(*source), options->policy);
     if (options->connect_timeout_ms > 0)
-      if (const ivis_status met = made->meet(std::chrono::milliseconds(options->connect_timeout_ms)); met != IVIS_OK)
+      if (const ivis_status met =
+              made->meet(std::chrono::milliseconds(options->connect_timeout_ms));
+          met != IVIS_OK)
         return refuse(met, network.endpoint + ": " + made->error());
     *client = made.release();
     return IVIS_OK;
@@ -78,11 +83,14 @@ ivis_status ivis_client_connect(const ivis_client_options* options, ivis_client*
 }
 
 ivis_client* ivis_client_adopt_source_(void* pvs_source, ivis_policy policy) {
-  std::unique_ptr<ivis::client::PvsSource> source(static_cast<ivis::client::PvsSource*>(pvs_source));
+  std::unique_ptr<ivis::client::PvsSource> source(
+      static_cast<ivis::client::PvsSource*>(pvs_source));
   return new (std::nothrow) ivis_client(std::move(source), policy);
 }
 
-void ivis_client_close(ivis_client* client) { delete client; }
+void ivis_client_close(ivis_client* client) {
+  delete client;
+}
 
 ivis_status ivis_client_pose(ivis_client* client, const double eye[3]) {
   if (client == nullptr || eye == nullptr) return IVIS_ERROR_ARGUMENT;
@@ -122,7 +130,8 @@ ivis_status ivis_client_info(const ivis_client* client, ivis_info* out) {
   return IVIS_OK;
 }
 
-ivis_status ivis_object_node(const ivis_client* client, uint32_t id, uint32_t* node, uint32_t* instance) {
+ivis_status ivis_object_node(const ivis_client* client, uint32_t id, uint32_t* node,
+                             uint32_t* instance) {
   if (client == nullptr) return IVIS_ERROR_ARGUMENT;
   const Catalogue* c = client->source().catalogue();
   if (c == nullptr) return IVIS_ERROR_CONNECTION;
@@ -132,7 +141,8 @@ ivis_status ivis_object_node(const ivis_client* client, uint32_t id, uint32_t* n
   return IVIS_OK;
 }
 
-ivis_status ivis_object_id(const ivis_client* client, uint32_t node, uint32_t instance, uint32_t* id) {
+ivis_status ivis_object_id(const ivis_client* client, uint32_t node, uint32_t instance,
+                           uint32_t* id) {
   if (client == nullptr || id == nullptr) return IVIS_ERROR_ARGUMENT;
   const Catalogue* c = client->source().catalogue();
   if (c == nullptr) return IVIS_ERROR_CONNECTION;
@@ -151,13 +161,20 @@ const char* ivis_client_error(const ivis_client* client) {
 
 const char* ivis_status_name(ivis_status status) {
   switch (status) {
-    case IVIS_OK: return "ok";
-    case IVIS_ERROR_ARGUMENT: return "invalid argument";
-    case IVIS_ERROR_INPUT: return "bad input";
-    case IVIS_ERROR_IO: return "input/output";
-    case IVIS_ERROR_MISMATCH: return "mismatch";
-    case IVIS_ERROR_CONNECTION: return "connection";
-    case IVIS_ERROR_TIMEOUT: return "timeout";
+    case IVIS_OK:
+      return "ok";
+    case IVIS_ERROR_ARGUMENT:
+      return "invalid argument";
+    case IVIS_ERROR_INPUT:
+      return "bad input";
+    case IVIS_ERROR_IO:
+      return "input/output";
+    case IVIS_ERROR_MISMATCH:
+      return "mismatch";
+    case IVIS_ERROR_CONNECTION:
+      return "connection";
+    case IVIS_ERROR_TIMEOUT:
+      return "timeout";
   }
   return "unknown";
 }

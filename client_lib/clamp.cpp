@@ -10,7 +10,9 @@ Vec3 clamp_to_cell(const ViewCell& cell, const Vec3& p) {
   const Vec3& e = cell.reach.half_extents();
   Vec3 v = p - cell.eye;
   switch (cell.reach.kind()) {
-    case Reach::Kind::kBox: v = glm::clamp(v, -e, e); break;
+    case Reach::Kind::kBox:
+      v = glm::clamp(v, -e, e);
+      break;
     case Reach::Kind::kDisc:
     case Reach::Kind::kCylinder: {
       const double r = std::hypot(v.x, v.z);
@@ -26,8 +28,10 @@ Vec3 clamp_to_cell(const ViewCell& cell, const Vec3& p) {
       // A flat axis leaves nothing along it.
       Vec3 q{0};
       for (int k = 0; k < 3; ++k) {
-        if (e[k] > 0) q[k] = v[k] / e[k];
-        else v[k] = 0;
+        if (e[k] > 0)
+          q[k] = v[k] / e[k];
+        else
+          v[k] = 0;
       }
       const double length = std::hypot(q.x, q.y, q.z);
       if (length > 1) v /= length;

@@ -12,10 +12,13 @@ using ivis::client::IdBits;
 
 namespace {
 
-bool finite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+bool finite(const Vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 void put(const Vec3& v, double (&out)[3]) {
-  for (int k = 0; k < 3; ++k) out[k] = v[k];
+  for (int k = 0; k < 3; ++k)
+    out[k] = v[k];
 }
 
 }  // namespace
@@ -24,13 +27,18 @@ namespace ivis::client {
 
 ivis_status status_of(const Error& error) {
   switch (error.code) {
-    case ErrorCode::kInvalidArgument: return IVIS_ERROR_ARGUMENT;
+    case ErrorCode::kInvalidArgument:
+      return IVIS_ERROR_ARGUMENT;
     case ErrorCode::kInput:
-    case ErrorCode::kUnsupported: return IVIS_ERROR_INPUT;
-    case ErrorCode::kIo: return IVIS_ERROR_IO;
-    case ErrorCode::kMismatch: return IVIS_ERROR_MISMATCH;
+    case ErrorCode::kUnsupported:
+      return IVIS_ERROR_INPUT;
+    case ErrorCode::kIo:
+      return IVIS_ERROR_IO;
+    case ErrorCode::kMismatch:
+      return IVIS_ERROR_MISMATCH;
     case ErrorCode::kConnection:
-    case ErrorCode::kCancelled: return IVIS_ERROR_CONNECTION;
+    case ErrorCode::kCancelled:
+      return IVIS_ERROR_CONNECTION;
   }
   return IVIS_ERROR_CONNECTION;
 }
@@ -63,7 +71,8 @@ ivis_status ivis_client::fail(ivis_status status, std::string text) {
 }
 
 ivis_status ivis_client::state() {
-  if (const ivis::Error* e = source_->failure()) return fail(ivis::client::status_of(*e), e->message);
+  if (const ivis::Error* e = source_->failure())
+    return fail(ivis::client::status_of(*e), e->message);
   error_ = source_->trouble();
   return IVIS_OK;
 }
@@ -74,7 +83,8 @@ void ivis_client::take() {
   const Sent& sent = sent_[answer_.sequence % sent_.size()];
   if (sent.sequence == answer_.sequence)
     stats_.last_round_trip_ms =
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - sent.at).count();
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - sent.at)
+            .count();
 }
 
 ivis_status ivis_client::pose(const Vec3& eye) {
@@ -96,7 +106,8 @@ ivis_status ivis_client::wait(std::chrono::milliseconds timeout) {
     if (std::chrono::steady_clock::now() >= deadline) {
       const std::string why = source_->trouble();
       return fail(IVIS_ERROR_TIMEOUT, "no PVS for pose " + std::to_string(sequence_) + " within " +
-                                          std::to_string(timeout.count()) + " ms" + (why.empty() ? "" : ": " + why));
+                                          std::to_string(timeout.count()) + " ms" +
+                                          (why.empty() ? "" : ": " + why));
     }
     source_->wait(deadline);
   }
@@ -109,7 +120,8 @@ ivis_status ivis_client::meet(std::chrono::milliseconds timeout) {
     if (source_->failure() != nullptr) return state();
     if (source_->catalogue() != nullptr) return state();
     if (std::chrono::steady_clock::now() >= deadline)
-      return fail(IVIS_ERROR_CONNECTION, "no answer within " + std::to_string(timeout.count()) + " ms: " + source_->trouble());
+      return fail(IVIS_ERROR_CONNECTION, "no answer within " + std::to_string(timeout.count()) +
+                                             " ms: " + source_->trouble());
     source_->wait(deadline);
   }
 }

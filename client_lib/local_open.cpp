@@ -53,9 +53,11 @@ ivis_status ivis_local_open(const ivis_local_options* options, ivis_client** cli
     return refuse(IVIS_ERROR_ARGUMENT, "options were not made by ivis_local_options_default()");
   if (options->scene_file == nullptr) return refuse(IVIS_ERROR_ARGUMENT, "no scene file");
   if (options->policy < IVIS_POLICY_EVERYTHING || options->policy > IVIS_POLICY_INCOMPLETE)
-    return refuse(IVIS_ERROR_ARGUMENT, "unknown policy " + std::to_string(static_cast<int>(options->policy)));
+    return refuse(IVIS_ERROR_ARGUMENT,
+                  "unknown policy " + std::to_string(static_cast<int>(options->policy)));
   if (options->threads < 1 || options->threads > 256)
-    return refuse(IVIS_ERROR_ARGUMENT, std::to_string(options->threads) + " threads, expected 1 to 256");
+    return refuse(IVIS_ERROR_ARGUMENT,
+                  std::to_string(options->threads) + " threads, expected 1 to 256");
   try {
     auto source = open(*options);
     if (!source) return refuse(client::status_of(source.error()), source.error().message);

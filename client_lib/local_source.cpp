@@ -85,9 +85,11 @@ class LocalSource : public PvsSource {
     answer.solve_ms = std::chrono::duration<double, std::milli>(took).count();
     answer.everything = !pvs || !pvs->everything_because.empty();
     answer.bits.assign(answer.everything ? 0 : words_for(world_.catalogue.objects()), 0);
-    answer.count = answer.everything ? world_.catalogue.objects() : static_cast<std::uint32_t>(pvs->objects.size());
+    answer.count = answer.everything ? world_.catalogue.objects()
+                                     : static_cast<std::uint32_t>(pvs->objects.size());
     if (!answer.everything)
-      for (const ObjectId id : pvs->objects) answer.bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
+      for (const ObjectId id : pvs->objects)
+        answer.bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
     return pvs ? "" : pvs.error().message;
   }
 

@@ -28,7 +28,8 @@ constexpr std::size_t kRememberedEyes = 1024;
 std::string hex(std::uint64_t v) {
   constexpr std::string_view kDigits = "0123456789abcdef";
   std::string text;
-  for (int shift = 60; shift >= 0; shift -= 4) text += kDigits[(v >> static_cast<unsigned>(shift)) & 15U];
+  for (int shift = 60; shift >= 0; shift -= 4)
+    text += kDigits[(v >> static_cast<unsigned>(shift)) & 15U];
   return text;
 }
 
@@ -36,10 +37,13 @@ std::string hex(std::uint64_t v) {
 
 struct NetworkSource::Impl {
   explicit Impl(const NetworkOptions& o)
-      : options(o), scene_hash(o.scene_hash), context(1), socket(context, zmq::socket_type::dealer) {
-    socket.set(zmq::sockopt::linger, 100);       // ms, for Bye
-    // Not ZMQ_IMMEDIATE: it would drop a farewell that is followed at once by the disconnect. So a few
-    // messages may wait for a server that is not there; it answers only the latest.
+      : options(o),
+        scene_hash(o.scene_hash),
+        context(1),
+        socket(context, zmq::socket_type::dealer) {
+    socket.set(zmq::sockopt::linger, 100);  // ms, for Bye
+    // Not ZMQ_IMMEDIATE: it would drop a farewell that is followed at once by the disconnect. So a
+    // few messages may wait for a server that is not there; it answers only the latest.
     socket.set(zmq::sockopt::sndhwm, 8);
     socket.set(zmq::sockopt::rcvhwm, 256);
     socket.set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(wire::kMaxMessageBytes));
@@ -47,7 +51,8 @@ struct NetworkSource::Impl {
     socket.set(zmq::sockopt::reconnect_ivl_max, 1000);
     socket.set(zmq::sockopt::heartbeat_ivl, 2000);
     socket.set(zmq::sockopt::heartbeat_timeout, 6000);
-    socket.set(zmq::sockopt::ipv6, options.endpoint.find('[') != std::string::npos);  // tcp://[::1]:7447
+    socket.set(zmq::sockopt::ipv6,
+               options.endpoint.find('[') != std::string::npos);  // tcp://[::1]:7447
     socket.connect(options.endpoint);
   }
 
@@ -70,7 +75,8 @@ struct NetworkSource::Impl {
     const auto now = Clock::now();
     // Silence: a pose is unanswered and nothing at all has come for too long.
     if (session != 0 && waiting_since && now - *waiting_since > options.silence) {
-      begin_again("the server has been silent for " + std::to_string(options.silence.count()) + " ms", now);
+      begin_again(
+          "the server has been silent for " + std::to_string(options.silence.count()) + " ms", now);
     }
     if (session == 0) {
       if (now >= next_hello &&
@@ -106,7 +112,9 @@ struct NetworkSource::Impl {
       any = true;
       if (message.more()) {  // a server sends single frames
         ++counted.bad_messages;
-        do static_cast<void>(socket.recv(message, zmq::recv_flags::none)); while (message.more());
+        do
+          static_cast<void>(socket.recv(message, zmq::recv_flags::none));
+        while (message.more());
         continue;
       }
       auto decoded = wire::decode({static_cast<const std::byte*>(message.data()), message.size()});
@@ -116,7 +124,8 @@ struct NetworkSource::Impl {
         continue;
       }
       if (auto* pvs = std::get_if<wire::PvsMessage>(&*decoded)) {
-        if (pvs->session != session || pvs->sequence > sequence || pvs->sequence <= answered) continue;
+        if (pvs->session != session || pvs->sequence > sequence || pvs->sequence <= answered)
+          continue;
         ++counted.answers;
         counted.bytes += message.size();
         if (!newest || pvs->sequence > newest->sequence) newest = std::move(*pvs);
@@ -137,13 +146,15 @@ struct NetworkSource::Impl {
   }
 
   void handle(wire::Welcome& w) {
-    // A second Welcome answers a Hello that was repeated too soon; the server knows its session only.
+    // A second Welcome answers a Hello that was repeated too soon; the server knows its session
+    // only.
     const bool was_lost = session == 0;
     if (w.version != wire::kProtocolVersion)
-      return fail(mismatch("the server speaks version " + std::to_string(w.version) + ", the client " +
-                           std::to_string(wire::kProtocolVersion)));
+      return fail(mismatch("the server speaks version " + std::to_string(w.version) +
+                           ", the client " + std::to_string(wire::kProtocolVersion)));
     if (scene_hash != 0 && w.scene_hash != scene_hash)
-      return fail(mismatch("the client's scene has the hash " + hex(scene_hash) + ", the server's " + hex(w.scene_hash)));
+      return fail(mismatch("the client's scene has the hash " + hex(scene_hash) +
+                           ", the server's " + hex(w.scene_hash)));
     auto reach_served = Reach::parse(w.reach);
     if (w.session == 0 || !reach_served || w.table.id.size() != w.objects ||
         w.table.node.size() != w.objects || w.table.instance.size() != w.objects) {
@@ -167,7 +178,8 @@ struct NetworkSource::Impl {
       return;
     }
     if (catalogue && (told.node != catalogue->node || told.instance != catalogue->instance))
-      return fail(mismatch("the server's objects have changed under the scene hash " + hex(w.scene_hash)));
+      return fail(
+          mismatch("the server's objects have changed under the scene hash " + hex(w.scene_hash)));
     if (catalogue && was_lost) ++counted.reconnects;
     catalogue = std::move(told);
     id_of = std::move(w.table.id);
@@ -188,11 +200,15 @@ struct NetworkSource::Impl {
     switch (r.reason) {
       case wire::Refusal::kVersion:
       case wire::Refusal::kScene:
-      case wire::Refusal::kReach: return fail(mismatch(text));
-      case wire::Refusal::kBusy: return begin_again(text, Clock::now() + kBusyPause);
+      case wire::Refusal::kReach:
+        return fail(mismatch(text));
+      case wire::Refusal::kBusy:
+        return begin_again(text, Clock::now() + kBusyPause);
       case wire::Refusal::kClosing:
-      case wire::Refusal::kMalformed: return begin_again(text, Clock::now() + kHelloAgain);
-      case wire::Refusal::kSession: return begin_again(text, Clock::now());
+      case wire::Refusal::kMalformed:
+        return begin_again(text, Clock::now() + kHelloAgain);
+      case wire::Refusal::kSession:
+        return begin_again(text, Clock::now());
     }
   }
 
@@ -246,7 +262,8 @@ struct NetworkSource::Impl {
   Reach reach;
   std::uint64_t session = 0;  ///< 0: greeting
   Clock::time_point next_hello{};
-  std::optional<Clock::time_point> waiting_since;  ///< last sign of life with a pose due or unanswered
+  std::optional<Clock::time_point>
+      waiting_since;  ///< last sign of life with a pose due or unanswered
   std::array<Eye, kRememberedEyes> eyes{};
   std::uint32_t sequence = 0;  ///< of the latest pose
   std::uint32_t answered = 0;  ///< of the latest pose that was
@@ -267,7 +284,8 @@ NetworkSource::~NetworkSource() = default;
 
 Result<std::unique_ptr<NetworkSource>> NetworkSource::open(const NetworkOptions& options) {
   if (!options.endpoint.starts_with("tcp://") && !options.endpoint.starts_with("ipc://"))
-    return invalid_argument("'" + options.endpoint + "' is not an address, expected tcp://HOST:PORT or ipc://PATH");
+    return invalid_argument("'" + options.endpoint +
+                            "' is not an address, expected tcp://HOST:PORT or ipc://PATH");
   if (!options.reach.empty())
     if (auto reach = Reach::parse(options.reach); !reach) return reach.error();
   try {
@@ -277,7 +295,9 @@ Result<std::unique_ptr<NetworkSource>> NetworkSource::open(const NetworkOptions&
   }
 }
 
-const Catalogue* NetworkSource::catalogue() const { return impl_->catalogue ? &*impl_->catalogue : nullptr; }
+const Catalogue* NetworkSource::catalogue() const {
+  return impl_->catalogue ? &*impl_->catalogue : nullptr;
+}
 
 void NetworkSource::send(std::uint32_t sequence, const Vec3& eye) {
   impl_->sequence = sequence;
@@ -309,9 +329,17 @@ void NetworkSource::wait(Time deadline) {
   }
 }
 
-bool NetworkSource::connected() const { return impl_->session != 0; }
-const Error* NetworkSource::failure() const { return impl_->failed ? &*impl_->failed : nullptr; }
-std::string NetworkSource::trouble() const { return impl_->last_trouble; }
-SourceStats NetworkSource::stats() const { return impl_->counted; }
+bool NetworkSource::connected() const {
+  return impl_->session != 0;
+}
+const Error* NetworkSource::failure() const {
+  return impl_->failed ? &*impl_->failed : nullptr;
+}
+std::string NetworkSource::trouble() const {
+  return impl_->last_trouble;
+}
+SourceStats NetworkSource::stats() const {
+  return impl_->counted;
+}
 
 }  // namespace ivis::client

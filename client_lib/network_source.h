@@ -10,13 +10,13 @@ namespace ivis::client {
 
 struct NetworkOptions {
   std::string endpoint;
-  SceneHash scene_hash = 0;  ///< 0: whatever the server has; held to from then on
-  std::string reach;         ///< empty: the server's
+  SceneHash scene_hash = 0;                 ///< 0: whatever the server has; held to from then on
+  std::string reach;                        ///< empty: the server's
   std::chrono::milliseconds silence{2000};  ///< unanswered for so long: greet anew
 };
 
-/// A session with a server, kept alive: whenever the server is lost, says so, or no longer knows the
-/// session, Hello is said again until it answers. Bytes are decoded in the caller's thread.
+/// A session with a server, kept alive: whenever the server is lost, says so, or no longer knows
+/// the session, Hello is said again until it answers. Bytes are decoded in the caller's thread.
 /// What ends it for good: a server with another scene, version, or too small a reach.
 class NetworkSource : public PvsSource {
  public:

@@ -21,7 +21,8 @@ class PvsHistory {
   /// Null if it is not here. Forgets what is older.
   const wire::PvsState* base(std::uint32_t sequence) {
     std::size_t i = 0;
-    while (i < kept_.size() && kept_[i].first != sequence) ++i;
+    while (i < kept_.size() && kept_[i].first != sequence)
+      ++i;
     if (i == kept_.size()) return nullptr;
     kept_.erase(kept_.begin(), kept_.begin() + static_cast<std::ptrdiff_t>(i));
     return &kept_.front().second;

@@ -42,13 +42,17 @@ template <class N>
 std::optional<N> number(std::string_view word, int base = 10) {
   N v{};
   std::from_chars_result r{};
-  if constexpr (std::is_floating_point_v<N>) r = std::from_chars(word.data(), word.data() + word.size(), v);
-  else r = std::from_chars(word.data(), word.data() + word.size(), v, base);
+  if constexpr (std::is_floating_point_v<N>)
+    r = std::from_chars(word.data(), word.data() + word.size(), v);
+  else
+    r = std::from_chars(word.data(), word.data() + word.size(), v, base);
   if (r.ec != std::errc{} || r.ptr != word.data() + word.size()) return std::nullopt;
   return v;
 }
 
-std::string shown(std::string_view text) { return "'" + std::string(text.substr(0, 60)) + "'"; }
+std::string shown(std::string_view text) {
+  return "'" + std::string(text.substr(0, 60)) + "'";
+}
 
 Result<Vec3> point(Words& words, const char* what) {
   Vec3 p{0};
@@ -56,7 +60,8 @@ Result<Vec3> point(Words& words, const char* what) {
     const std::string_view word = words.next();
     const auto v = number<double>(word);
     if (!v || !std::isfinite(*v))
-      return input_error(std::string(what) + ": found " + shown(word) + ", expected a finite number");
+      return input_error(std::string(what) + ": found " + shown(word) +
+                         ", expected a finite number");
     p[k] = *v;
   }
   return p;
@@ -75,7 +80,8 @@ Status ids(Words& words, std::uint32_t objects, std::vector<ObjectId>& out) {
     const auto step = number<std::uint32_t>(text);
     const std::uint64_t id = step ? std::uint64_t{*step} + (i == 0 ? 0 : out.back()) : objects;
     if (!step || (i != 0 && *step == 0) || id >= objects)
-      return input_error("found " + shown(text) + " as id or gap, expected ids that ascend and are below " +
+      return input_error("found " + shown(text) +
+                         " as id or gap, expected ids that ascend and are below " +
                          std::to_string(objects));
     out.push_back(static_cast<ObjectId>(id));
   }

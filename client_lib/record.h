@@ -21,10 +21,11 @@ namespace ivis::client {
 
 /// One frame of a walk.
 struct RecordedFrame {
-  Vec3 eye{0};           ///< drawn from; in pvs.cell when covered
+  Vec3 eye{0};  ///< drawn from; in pvs.cell when covered
   bool covered = false;
-  bool everything = false;  ///< every object was visible; pvs.objects is then empty, unlike elsewhere
-  Pvs pvs;               ///< with its cell and the scene's hash
+  bool everything =
+      false;  ///< every object was visible; pvs.objects is then empty, unlike elsewhere
+  Pvs pvs;    ///< with its cell and the scene's hash
 };
 
 struct Record {
@@ -35,8 +36,8 @@ struct Record {
 };
 
 std::string encode_record(const Record& record);
-/// Untrusted text. Errors: kInput naming `name`, line, what was found and expected; a covered frame whose eye
-/// is outside its cell is one of them. Memory: a small multiple of the text.
+/// Untrusted text. Errors: kInput naming `name`, line, what was found and expected; a covered frame
+/// whose eye is outside its cell is one of them. Memory: a small multiple of the text.
 Result<Record> decode_record(std::string_view text, const std::string& name);
 
 /// The file appears whole or not at all. Errors: kIo.

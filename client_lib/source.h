@@ -15,7 +15,9 @@ namespace ivis::client {
 
 /// Object sets by id, one bit each; bits past the last object are zero.
 using IdBits = std::vector<std::uint64_t>;
-inline std::size_t words_for(std::size_t objects) { return (objects + 63) / 64; }
+inline std::size_t words_for(std::size_t objects) {
+  return (objects + 63) / 64;
+}
 
 /// What is served: the same for as long as a client lives, but for the reach.
 struct Catalogue {
@@ -34,9 +36,9 @@ Status check_catalogue(const Catalogue& catalogue);
 struct Answer {
   std::uint32_t sequence = 0;  ///< of the pose; 0: no answer yet
   ViewCell cell;
-  bool everything = false;     ///< every object is listed: true wherever the eye is; bits are empty
+  bool everything = false;  ///< every object is listed: true wherever the eye is; bits are empty
   IdBits bits;
-  std::uint32_t count = 0;     ///< of bits set
+  std::uint32_t count = 0;  ///< of bits set
   double solve_ms = 0;
 };
 

@@ -27,24 +27,34 @@ double quantile(std::vector<double> values, double q) {
 
 ivis_policy policy_of(WalkOptions::Policy policy) {
   switch (policy) {
-    case WalkOptions::Policy::kEverything: return IVIS_POLICY_EVERYTHING;
-    case WalkOptions::Policy::kStall: return IVIS_POLICY_STALL;
-    case WalkOptions::Policy::kIncomplete: return IVIS_POLICY_INCOMPLETE;
+    case WalkOptions::Policy::kEverything:
+      return IVIS_POLICY_EVERYTHING;
+    case WalkOptions::Policy::kStall:
+      return IVIS_POLICY_STALL;
+    case WalkOptions::Policy::kIncomplete:
+      return IVIS_POLICY_INCOMPLETE;
   }
   return IVIS_POLICY_EVERYTHING;
 }
 
 Error error_of(ivis_status status, std::string text) {
   switch (status) {
-    case IVIS_ERROR_MISMATCH: return mismatch(std::move(text));
-    case IVIS_ERROR_ARGUMENT: return invalid_argument(std::move(text));
-    case IVIS_ERROR_INPUT: return input_error(std::move(text));
-    case IVIS_ERROR_IO: return io_error(std::move(text));
-    default: return connection_error(std::move(text));
+    case IVIS_ERROR_MISMATCH:
+      return mismatch(std::move(text));
+    case IVIS_ERROR_ARGUMENT:
+      return invalid_argument(std::move(text));
+    case IVIS_ERROR_INPUT:
+      return input_error(std::move(text));
+    case IVIS_ERROR_IO:
+      return io_error(std::move(text));
+    default:
+      return connection_error(std::move(text));
   }
 }
 
-Vec3 vec(const double (&p)[3]) { return {p[0], p[1], p[2]}; }
+Vec3 vec(const double (&p)[3]) {
+  return {p[0], p[1], p[2]};
+}
 
 client::RecordedFrame recorded(const PvsView& view, const Reach& reach, SceneHash hash) {
   client::RecordedFrame f;
@@ -72,7 +82,8 @@ WalkReport summary(const Samples& samples, const ivis_stats& stats, const ivis_i
   r.stalls = stats.stalls;
   r.uncovered_frames = stats.uncovered_frames;
   r.reconnects = stats.reconnects;
-  r.bytes_mean = static_cast<double>(stats.bytes) / static_cast<double>(std::max<std::uint64_t>(stats.poses, 1));
+  r.bytes_mean = static_cast<double>(stats.bytes) /
+                 static_cast<double>(std::max<std::uint64_t>(stats.poses, 1));
   r.bytes_median = quantile(samples.bytes, 0.5);
   r.round_trip_ms_p50 = quantile(samples.round_trip_ms, 0.5);
   r.round_trip_ms_p99 = quantile(samples.round_trip_ms, 0.99);
@@ -87,8 +98,9 @@ WalkReport summary(const Samples& samples, const ivis_stats& stats, const ivis_i
 
 }  // namespace
 
-Result<WalkReport> walk(const std::string& endpoint, const std::vector<Pose>& path, const WalkOptions& options,
-                        const Context& context, const std::function<void(const WalkProgress&)>& on_frame) {
+Result<WalkReport> walk(const std::string& endpoint, const std::vector<Pose>& path,
+                        const WalkOptions& options, const Context& context,
+                        const std::function<void(const WalkProgress&)>& on_frame) {
   if (path.empty()) return invalid_argument("a walk along an empty path");
   if (!(options.hz >= 0 && options.hz <= 1000))
     return invalid_argument("hz " + std::to_string(options.hz) + ", expected 0 to 1000");
@@ -141,17 +153,19 @@ Result<WalkReport> walk(const std::string& endpoint, const std::vector<Pose>& pa
     }
     if (stats.reconnects != before.reconnects && options.record_file)
       if (const auto now = client.info(); now && record.reach.to_string() != now->reach)
-        return mismatch("the server came back with the reach " + std::string(now->reach) + ", the record is of " +
-                        record.reach.to_string());
+        return mismatch("the server came back with the reach " + std::string(now->reach) +
+                        ", the record is of " + record.reach.to_string());
     before = stats;
-    if (options.record_file) record.frames.push_back(recorded(*view, record.reach, record.scene_hash));
+    if (options.record_file)
+      record.frames.push_back(recorded(*view, record.reach, record.scene_hash));
     context.report("walking", i + 1, path.size());
     if (on_frame)
-      on_frame({i + 1, path.size(), view->count(), stats.last_solve_ms, stats.last_round_trip_ms, stats.bytes,
-                stats.stalls, stats.uncovered_frames});
+      on_frame({i + 1, path.size(), view->count(), stats.last_solve_ms, stats.last_round_trip_ms,
+                stats.bytes, stats.stalls, stats.uncovered_frames});
   }
   if (options.record_file)
-    if (auto written = client::write_record(*options.record_file, record); !written) return written.error();
+    if (auto written = client::write_record(*options.record_file, record); !written)
+      return written.error();
   info = client.info();
   return summary(samples, client.stats(), *info);
 }

@@ -40,7 +40,8 @@ Status check_port(const std::string& endpoint) {
   unsigned value = 0;
   const auto parsed = std::from_chars(port.data(), port.data() + port.size(), value);
   if (parsed.ec != std::errc{} || parsed.ptr != port.data() + port.size() || value > 65535)
-    return invalid_argument("'" + endpoint + "': found port '" + port + "', expected 0 to 65535 or *");
+    return invalid_argument("'" + endpoint + "': found port '" + port +
+                            "', expected 0 to 65535 or *");
   return ok();
 }
 
@@ -49,7 +50,8 @@ Status check_port(const std::string& endpoint) {
 Status claim_address(const std::string& endpoint) {
   if (endpoint.starts_with(kTcp)) return check_port(endpoint);
   if (!endpoint.starts_with(kIpc))
-    return invalid_argument("'" + endpoint + "' is not an address, expected tcp://HOST:PORT or ipc://PATH");
+    return invalid_argument("'" + endpoint +
+                            "' is not an address, expected tcp://HOST:PORT or ipc://PATH");
   const std::string path = endpoint.substr(kIpc.size());
   if (path.empty() || path.size() >= sizeof(sockaddr_un::sun_path))
     return invalid_argument("'" + endpoint + "': the path of an ipc address has 1 to " +
@@ -57,15 +59,15 @@ Status claim_address(const std::string& endpoint) {
   if (path[0] == '@' || path == "*") return ok();  // no file; the system refuses a second one
   struct stat info {};
   if (lstat(path.c_str(), &info) != 0) return ok();
-  if (!S_ISSOCK(info.st_mode))
-    return connection_error("'" + path + "' exists and is not a socket");
+  if (!S_ISSOCK(info.st_mode)) return connection_error("'" + path + "' exists and is not a socket");
   switch (who_listens(path)) {
     case Listener::kLive:
       return connection_error("another server already listens on " + endpoint);
     case Listener::kUnknown:
       return connection_error("'" + path + "' cannot be asked whether a server listens there: " +
                               std::generic_category().message(errno));
-    case Listener::kNone: break;
+    case Listener::kNone:
+      break;
   }
   if (unlink(path.c_str()) != 0 && errno != ENOENT)
     return connection_error("cannot remove the stale socket '" + path +

@@ -8,9 +8,9 @@ namespace ivis::server {
 
 /// Makes an endpoint free to bind: an ipc path at which nobody listens is removed, as ZeroMQ would
 /// take over a live one just as silently as a dead one.
-/// Errors: kInvalidArgument for anything but tcp:// and ipc://; kConnection when a live server listens
-/// there, or when the path is something other than a socket (which is left alone).
-/// Limits: two servers that start within the same instant on one ipc path are not told apart.
+/// Errors: kInvalidArgument for anything but tcp:// and ipc://; kConnection when a live server
+/// listens there, or when the path is something other than a socket (which is left alone). Limits:
+/// two servers that start within the same instant on one ipc path are not told apart.
 Status claim_address(const std::string& endpoint);
 
 }  // namespace ivis::server

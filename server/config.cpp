@@ -31,8 +31,8 @@ Result<unsigned> number(const std::string& text, unsigned low, unsigned high) {
   unsigned v = 0;
   const auto r = std::from_chars(text.data(), text.data() + text.size(), v);
   if (r.ec != std::errc{} || r.ptr != text.data() + text.size() || v < low || v > high)
-    return invalid_argument("found '" + text + "', expected a whole number from " + std::to_string(low) + " to " +
-                            std::to_string(high));
+    return invalid_argument("found '" + text + "', expected a whole number from " +
+                            std::to_string(low) + " to " + std::to_string(high));
   return v;
 }
 
@@ -75,11 +75,16 @@ auto get_text(std::string Config::*field) {
 
 const char* level_name(LogLevel level) {
   switch (level) {
-    case LogLevel::kDebug: return "debug";
-    case LogLevel::kInfo: return "info";
-    case LogLevel::kWarn: return "warn";
-    case LogLevel::kError: return "error";
-    case LogLevel::kOff: return "off";
+    case LogLevel::kDebug:
+      return "debug";
+    case LogLevel::kInfo:
+      return "info";
+    case LogLevel::kWarn:
+      return "warn";
+    case LogLevel::kError:
+      return "error";
+    case LogLevel::kOff:
+      return "off";
   }
   return "info";
 }
@@ -112,27 +117,53 @@ Status set_method(Config& c, const std::string& text) {
 
 const std::vector<Key>& keys() {
   static const std::vector<Key> all{
-      {{"scene", "FILE", "the scene, .glb or .gltf (required)"}, Kind::kPath,
-       get_path(&Config::scene), set_path(&Config::scene)},
-      {{"occluders", "FILE", "shrunk occluders of the scene, from `ivis shrink`; without: shrunk at start"},
-       Kind::kPath, get_path(&Config::occluders), set_path(&Config::occluders)},
-      {{"reach", "R", "how far an observer may get before the next answer; without: that of the occluders, or " +
-                          std::string(kDefaultReach)},
-       Kind::kText, get_text(&Config::reach), set_reach},
-      {{"listen", "ADDRESS", "tcp://HOST:PORT or ipc://PATH"}, Kind::kText, get_text(&Config::listen), set_listen},
-      {{"method", "NAME", "visibility method, of `ivis pvs --help`; without: the first there"}, Kind::kText, get_text(&Config::method), set_method},
-      {{"threads", "N", "threads inside one solve, 1 to 256"}, Kind::kNumber, get_number(&Config::threads),
+      {{"scene", "FILE", "the scene, .glb or .gltf (required)"},
+       Kind::kPath,
+       get_path(&Config::scene),
+       set_path(&Config::scene)},
+      {{"occluders", "FILE",
+        "shrunk occluders of the scene, from `ivis shrink`; without: shrunk at start"},
+       Kind::kPath,
+       get_path(&Config::occluders),
+       set_path(&Config::occluders)},
+      {{"reach", "R",
+        "how far an observer may get before the next answer; without: that of the occluders, or " +
+            std::string(kDefaultReach)},
+       Kind::kText,
+       get_text(&Config::reach),
+       set_reach},
+      {{"listen", "ADDRESS", "tcp://HOST:PORT or ipc://PATH"},
+       Kind::kText,
+       get_text(&Config::listen),
+       set_listen},
+      {{"method", "NAME", "visibility method, of `ivis pvs --help`; without: the first there"},
+       Kind::kText,
+       get_text(&Config::method),
+       set_method},
+      {{"threads", "N", "threads inside one solve, 1 to 256"},
+       Kind::kNumber,
+       get_number(&Config::threads),
        set_number(&Config::threads, 1, 256)},
-      {{"log_level", "LEVEL", "debug, info, warn, error or off"}, Kind::kText,
-       [](const Config& c) -> std::string { return level_name(c.log_level); }, set_level},
-      {{"json_logs", "", "log JSON objects instead of key=value"}, Kind::kSwitch, get_switch(&Config::json_logs),
+      {{"log_level", "LEVEL", "debug, info, warn, error or off"},
+       Kind::kText,
+       [](const Config& c) -> std::string { return level_name(c.log_level); },
+       set_level},
+      {{"json_logs", "", "log JSON objects instead of key=value"},
+       Kind::kSwitch,
+       get_switch(&Config::json_logs),
        set_switch(&Config::json_logs)},
-      {{"busy_poll", "", "spin for messages: costs a core, saves some tens of microseconds"}, Kind::kSwitch,
-       get_switch(&Config::busy_poll), set_switch(&Config::busy_poll)},
-      {{"max_clients", "N", "clients at one time, 1 to 100000"}, Kind::kNumber, get_number(&Config::max_clients),
+      {{"busy_poll", "", "spin for messages: costs a core, saves some tens of microseconds"},
+       Kind::kSwitch,
+       get_switch(&Config::busy_poll),
+       set_switch(&Config::busy_poll)},
+      {{"max_clients", "N", "clients at one time, 1 to 100000"},
+       Kind::kNumber,
+       get_number(&Config::max_clients),
        set_number(&Config::max_clients, 1, 100000)},
-      {{"idle_timeout_s", "S", "forget a client that said nothing for so long, 1 to 86400"}, Kind::kNumber,
-       get_number(&Config::idle_timeout_s), set_number(&Config::idle_timeout_s, 1, 86400)},
+      {{"idle_timeout_s", "S", "forget a client that said nothing for so long, 1 to 86400"},
+       Kind::kNumber,
+       get_number(&Config::idle_timeout_s),
+       set_number(&Config::idle_timeout_s, 1, 86400)},
   };
   return all;
 }
@@ -144,10 +175,14 @@ struct Found {
 
 /// The value as text; fails when its TOML type does not fit the key.
 Result<std::string> toml_text(const toml::node& node, Kind kind) {
-  if ((kind == Kind::kPath || kind == Kind::kText) && node.is_string()) return node.as_string()->get();
+  if ((kind == Kind::kPath || kind == Kind::kText) && node.is_string())
+    return node.as_string()->get();
   if (kind == Kind::kNumber && node.is_integer()) return std::to_string(node.as_integer()->get());
-  if (kind == Kind::kSwitch && node.is_boolean()) return std::string(node.as_boolean()->get() ? "true" : "false");
-  const char* expected = kind == Kind::kNumber ? "a whole number" : kind == Kind::kSwitch ? "true or false" : "a string";
+  if (kind == Kind::kSwitch && node.is_boolean())
+    return std::string(node.as_boolean()->get() ? "true" : "false");
+  const char* expected = kind == Kind::kNumber   ? "a whole number"
+                         : kind == Kind::kSwitch ? "true or false"
+                                                 : "a string";
   std::ostringstream type;
   type << node.type();
   return input_error("found a value of type " + type.str() + ", expected " + expected);
@@ -162,16 +197,19 @@ Result<std::map<std::string, Found>> read_toml(const std::filesystem::path& file
     for (const auto& [name, node] : table) {
       const std::string key(name.str());
       const std::string where = file.string() + ":" + std::to_string(name.source().begin.line);
-      const auto known = std::find_if(keys().begin(), keys().end(), [&](const Key& k) { return k.shown.key == key; });
+      const auto known = std::find_if(keys().begin(), keys().end(),
+                                      [&](const Key& k) { return k.shown.key == key; });
       if (known == keys().end()) return input_error(where + ": unknown key '" + key + "'");
       auto value = toml_text(node, known->kind);
       if (!value) return input_error(where + ": key '" + key + "': " + value.error().message);
-      if (known->kind == Kind::kPath && !value->empty() && std::filesystem::path(*value).is_relative())
+      if (known->kind == Kind::kPath && !value->empty() &&
+          std::filesystem::path(*value).is_relative())
         *value = (file.parent_path() / *value).string();
       out[key] = {*value, where};
     }
   } catch (const toml::parse_error& e) {
-    return input_error(file.string() + ":" + std::to_string(e.source().begin.line) + ": " + std::string(e.description()));
+    return input_error(file.string() + ":" + std::to_string(e.source().begin.line) + ": " +
+                       std::string(e.description()));
   } catch (const std::exception& e) {
     return input_error(file.string() + ": " + e.what());
   }
@@ -195,7 +233,8 @@ std::string toml_quoted(const std::string& text) {
 const std::vector<ConfigKey>& config_keys() {
   static const std::vector<ConfigKey> shown = [] {
     std::vector<ConfigKey> out;
-    for (const Key& k : keys()) out.push_back(k.shown);
+    for (const Key& k : keys())
+      out.push_back(k.shown);
     return out;
   }();
   return shown;
@@ -208,7 +247,8 @@ Environment process_environment() {
   };
 }
 
-Result<Configured> configure(const std::map<std::string, std::string>& flags, const Environment& environment,
+Result<Configured> configure(const std::map<std::string, std::string>& flags,
+                             const Environment& environment,
                              const std::optional<std::filesystem::path>& file) {
   std::map<std::string, Found> from_file;
   if (file) {
@@ -226,7 +266,8 @@ Result<Configured> configure(const std::map<std::string, std::string>& flags, co
     if (const auto v = environment(variable)) sources.push_back({*v, "environment " + variable});
     std::string flag = key;
     std::replace(flag.begin(), flag.end(), '_', '-');
-    if (const auto f = flags.find(key); f != flags.end()) sources.push_back({f->second, "flag --" + flag});
+    if (const auto f = flags.find(key); f != flags.end())
+      sources.push_back({f->second, "flag --" + flag});
     std::string origin = "default";
     for (const Found& s : sources) {
       if (auto set = k.set(out.config, s.text); !set)

@@ -13,15 +13,15 @@
 
 namespace ivis::server {
 
-/// What ivisd runs with. Every field is a key of the TOML file, an environment variable IVISD_<KEY> and
-/// a flag --<key> (with '-' for '_').
+/// What ivisd runs with. Every field is a key of the TOML file, an environment variable IVISD_<KEY>
+/// and a flag --<key> (with '-' for '_').
 struct Config {
   std::filesystem::path scene;
   std::filesystem::path occluders;  ///< empty: shrink at start
   std::string reach;                ///< empty: the occluder file's, or kDefaultReach
   std::string listen = "tcp://127.0.0.1:7447";
-  std::string method;               ///< empty: the first of method_list()
-  unsigned threads = 1;             ///< inside one solve
+  std::string method;    ///< empty: the first of method_list()
+  unsigned threads = 1;  ///< inside one solve
   LogLevel log_level = LogLevel::kInfo;
   bool json_logs = false;
   bool busy_poll = false;
@@ -54,11 +54,12 @@ const std::vector<ConfigKey>& config_keys();
 using Environment = std::function<std::optional<std::string>(const std::string& name)>;
 Environment process_environment();
 
-/// Flag over environment over file over default. `flags`: key -> text. Paths in the file are relative to
-/// its folder.
-/// Errors: kIo; kInput naming file, line and key, or variable; kInvalidArgument naming the flag; each
-/// with what was found and what was expected. Unknown keys are errors.
-Result<Configured> configure(const std::map<std::string, std::string>& flags, const Environment& environment,
+/// Flag over environment over file over default. `flags`: key -> text. Paths in the file are
+/// relative to its folder. Errors: kIo; kInput naming file, line and key, or variable;
+/// kInvalidArgument naming the flag; each with what was found and what was expected. Unknown keys
+/// are errors.
+Result<Configured> configure(const std::map<std::string, std::string>& flags,
+                             const Environment& environment,
                              const std::optional<std::filesystem::path>& file);
 
 /// As a TOML file that gives the same configuration, each line with its origin.

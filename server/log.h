@@ -26,12 +26,12 @@ struct LogField {
   LogField(std::string_view k, const char* v) : key(k), value(v) {}
   LogField(std::string_view k, const std::string& v) : key(k), value(v) {}
   template <class N>
-    requires std::integral<N> || std::floating_point<N>
-  LogField(std::string_view k, N v) : key(k), value(std::to_string(v)), is_number(true) {}
+  requires std::integral<N> || std::floating_point<N> LogField(std::string_view k, N v)
+      : key(k), value(std::to_string(v)), is_number(true) {}
 };
 
-/// Structured log on stderr: a line an event, as `time level event key=value ...` or as a JSON object.
-/// Threads: any.
+/// Structured log on stderr: a line an event, as `time level event key=value ...` or as a JSON
+/// object. Threads: any.
 class Log {
  public:
   Log(LogLevel level, bool json);
@@ -40,10 +40,18 @@ class Log {
   Log& operator=(const Log&) = delete;
 
   void write(LogLevel level, std::string_view event, std::initializer_list<LogField> fields = {});
-  void debug(std::string_view e, std::initializer_list<LogField> f = {}) { write(LogLevel::kDebug, e, f); }
-  void info(std::string_view e, std::initializer_list<LogField> f = {}) { write(LogLevel::kInfo, e, f); }
-  void warn(std::string_view e, std::initializer_list<LogField> f = {}) { write(LogLevel::kWarn, e, f); }
-  void error(std::string_view e, std::initializer_list<LogField> f = {}) { write(LogLevel::kError, e, f); }
+  void debug(std::string_view e, std::initializer_list<LogField> f = {}) {
+    write(LogLevel::kDebug, e, f);
+  }
+  void info(std::string_view e, std::initializer_list<LogField> f = {}) {
+    write(LogLevel::kInfo, e, f);
+  }
+  void warn(std::string_view e, std::initializer_list<LogField> f = {}) {
+    write(LogLevel::kWarn, e, f);
+  }
+  void error(std::string_view e, std::initializer_list<LogField> f = {}) {
+    write(LogLevel::kError, e, f);
+  }
 
  private:
   struct Impl;

@@ -27,10 +27,13 @@ enum Exit { kOk = 0, kUsage = 2, kInput = 3, kConnection = 4 };
 std::atomic<bool> stop_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
 
-void request_stop(int) { stop_requested.store(true); }
+void request_stop(int) {
+  stop_requested.store(true);
+}
 
 constexpr const char* kAbout =
-    "Serves visibility: tells each connected renderer which objects of a scene can be seen from anywhere\n"
+    "Serves visibility: tells each connected renderer which objects of a scene can be seen from "
+    "anywhere\n"
     "its observer can get to before the next answer.\n";
 constexpr const char* kMore =
     "Example:\n"
@@ -39,11 +42,14 @@ constexpr const char* kMore =
     "  ivis walk --connect tcp://127.0.0.1:7447 --path walk.csv\n"
     "  kill %1        (bids its clients farewell and exits 0)\n"
     "\n"
-    "Every option may also be a key of the --config file (log_level = \"debug\") or a variable of the\n"
+    "Every option may also be a key of the --config file (log_level = \"debug\") or a variable of "
+    "the\n"
     "environment (IVISD_LOG_LEVEL=debug). A flag goes over the environment, that over the file.\n"
-    "Reach R, in metres: ball:r, disc:r, cylinder:r,h, ellipsoid:a,b,c or box:a,b,c; h, a, b, c are\n"
+    "Reach R, in metres: ball:r, disc:r, cylinder:r,h, ellipsoid:a,b,c or box:a,b,c; h, a, b, c "
+    "are\n"
     "half-extents.\n"
-    "Exit codes: 0 done, 2 usage, 3 bad scene, occluders or configuration, 4 address taken or unusable.\n";
+    "Exit codes: 0 done, 2 usage, 3 bad scene, occluders or configuration, 4 address taken or "
+    "unusable.\n";
 
 struct CommandLine {
   std::map<std::string, std::string> given;
@@ -62,12 +68,15 @@ std::optional<int> parse(int argc, char** argv, CommandLine& line) {
   for (const ConfigKey& k : config_keys()) {
     std::string flag = "--" + k.key;
     std::replace(flag.begin(), flag.end(), '_', '-');
-    options[k.key] = k.form.empty() ? app.add_flag(flag, switches[k.key], k.help)
-                                    : app.add_option(flag, values[k.key], k.help)->type_name(k.form);
+    options[k.key] = k.form.empty()
+                         ? app.add_flag(flag, switches[k.key], k.help)
+                         : app.add_option(flag, values[k.key], k.help)->type_name(k.form);
   }
   std::string config;
-  CLI::Option* config_option = app.add_option("--config", config, "TOML file of these options")->type_name("FILE");
-  app.add_flag("--check-config", line.check, "print the configuration and where each value comes from, and exit");
+  CLI::Option* config_option =
+      app.add_option("--config", config, "TOML file of these options")->type_name("FILE");
+  app.add_flag("--check-config", line.check,
+               "print the configuration and where each value comes from, and exit");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -94,8 +103,8 @@ Context shown_progress(Log& log) {
   context.log = [&log](std::string_view text) { log.info("progress", {{"doing", text}}); };
   if (isatty(STDERR_FILENO) != 0) {
     context.progress = [](std::string_view stage, std::size_t done, std::size_t total) {
-      std::fprintf(stderr, "\r\x1b[K%.*s %zu/%zu%s", static_cast<int>(stage.size()), stage.data(), done, total,
-                   done >= total ? "\r\x1b[K" : "");
+      std::fprintf(stderr, "\r\x1b[K%.*s %zu/%zu%s", static_cast<int>(stage.size()), stage.data(),
+                   done, total, done >= total ? "\r\x1b[K" : "");
     };
   }
   return context;
@@ -134,14 +143,19 @@ int serve(const Config& config) {
     return report(world.error());
   }
   const World& w = **world;
-  for (const std::string& warning : w.scene.warnings) log.warn("scene", {{"warning", warning}});
-  log.info("loaded", {{"scene", config.scene.string()}, {"objects", w.scene.object_count()},
-                      {"triangles", w.scene.triangle_count}, {"occluders", w.occluders.shrunk.size()},
-                      {"reach", w.reach.to_string()}, {"method", w.method->traits().name}});
+  for (const std::string& warning : w.scene.warnings)
+    log.warn("scene", {{"warning", warning}});
+  log.info("loaded", {{"scene", config.scene.string()},
+                      {"objects", w.scene.object_count()},
+                      {"triangles", w.scene.triangle_count},
+                      {"occluders", w.occluders.shrunk.size()},
+                      {"reach", w.reach.to_string()},
+                      {"method", w.method->traits().name}});
 
   const ServedScene served = served_scene(w.scene);
   if (served.objects() > wire::kMaxMessageBytes / 12)
-    return report(input_error("'" + config.scene.string() + "' has " + std::to_string(served.objects()) +
+    return report(input_error("'" + config.scene.string() + "' has " +
+                              std::to_string(served.objects()) +
                               " objects, more than a message can name"));
   ServerOptions options;
   options.listen = config.listen;

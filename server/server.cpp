@@ -14,15 +14,16 @@ namespace {
 
 // Nothing a client sends is long; ZeroMQ drops a peer that sends more.
 constexpr std::int64_t kMaxIncomingBytes = 64 << 10;
-// Poses wait here for at most one solve; answers of a client that does not read are dropped beyond it.
+// Poses wait here for at most one solve; answers of a client that does not read are dropped beyond
+// it.
 constexpr int kReceiveQueue = 256;
 constexpr int kSendQueue = 16;
 constexpr int kMaxDrained = 4096;
 constexpr auto kLookAtStop = std::chrono::milliseconds(100);
 constexpr auto kHousekeeping = std::chrono::seconds(1);
 
-/// ZeroMQ leaves the file of an ipc socket behind. Removed while still bound: afterwards it could be
-/// another server's.
+/// ZeroMQ leaves the file of an ipc socket behind. Removed while still bound: afterwards it could
+/// be another server's.
 void remove_ipc_file(const std::string& endpoint) {
   constexpr std::string_view kIpc = "ipc://";
   if (endpoint.starts_with(kIpc) && endpoint.size() > kIpc.size() && endpoint[kIpc.size()] != '@')
@@ -32,15 +33,21 @@ void remove_ipc_file(const std::string& endpoint) {
 Error explain(const zmq::error_t& e, const std::string& listen) {
   if (e.num() == EADDRINUSE) return connection_error("another server already listens on " + listen);
   if (e.num() == EINVAL || e.num() == EPROTONOSUPPORT || e.num() == ENODEV)
-    return invalid_argument("'" + listen + "' is not an address of this machine, expected tcp://HOST:PORT or ipc://PATH");
+    return invalid_argument(
+        "'" + listen +
+        "' is not an address of this machine, expected tcp://HOST:PORT or ipc://PATH");
   return connection_error("cannot listen on " + listen + ": " + e.what());
 }
 
 }  // namespace
 
 struct Server::Impl {
-  Impl(const ServerOptions& o, const ServedScene& scene, const Method& method, const Reach& reach, Log& l)
-      : options(o), log(l), sessions(scene, method, reach, o.limits), context(1),
+  Impl(const ServerOptions& o, const ServedScene& scene, const Method& method, const Reach& reach,
+       Log& l)
+      : options(o),
+        log(l),
+        sessions(scene, method, reach, o.limits),
+        context(1),
         socket(context, zmq::socket_type::router) {}
 
   ~Impl() { give_back(); }
@@ -58,7 +65,8 @@ struct Server::Impl {
     socket.set(zmq::sockopt::linger, 500);  // ms, for the farewells
     socket.set(zmq::sockopt::heartbeat_ivl, 2000);
     socket.set(zmq::sockopt::heartbeat_timeout, 10000);
-    socket.set(zmq::sockopt::ipv6, options.listen.find('[') != std::string::npos);  // tcp://[::1]:7447
+    socket.set(zmq::sockopt::ipv6,
+               options.listen.find('[') != std::string::npos);  // tcp://[::1]:7447
   }
 
   /// Takes in what waits; a bound keeps a flood of messages from starving the answers.
@@ -68,15 +76,19 @@ struct Server::Impl {
     for (int i = 0; i < kMaxDrained; ++i) {
       if (!socket.recv(peer, zmq::recv_flags::dontwait)) return;
       bool more = peer.more();
-      bool one_body = more && static_cast<bool>(socket.recv(body, zmq::recv_flags::none)) && !body.more();
+      bool one_body =
+          more && static_cast<bool>(socket.recv(body, zmq::recv_flags::none)) && !body.more();
       if (more && !one_body) {
         zmq::message_t rest;
-        do static_cast<void>(socket.recv(rest, zmq::recv_flags::none)); while (rest.more());
+        do
+          static_cast<void>(socket.recv(rest, zmq::recv_flags::none));
+        while (rest.more());
       }
       const std::span<const std::byte> bytes(static_cast<const std::byte*>(body.data()),
                                              one_body ? body.size() : 0);
       const auto before = sessions.counters().malformed;
-      if (auto reply = sessions.receive(peer.to_string_view(), bytes, std::chrono::steady_clock::now()))
+      if (auto reply =
+              sessions.receive(peer.to_string_view(), bytes, std::chrono::steady_clock::now()))
         send(*reply);
       if (sessions.counters().malformed != before)
         log.warn("malformed_message", {{"bytes", bytes.size()}, {"total", before + 1}});
@@ -87,7 +99,8 @@ struct Server::Impl {
   /// acknowledgements make harmless.
   void send(const Outgoing& out) {
     try {
-      if (!socket.send(zmq::buffer(out.peer), zmq::send_flags::sndmore | zmq::send_flags::dontwait)) {
+      if (!socket.send(zmq::buffer(out.peer),
+                       zmq::send_flags::sndmore | zmq::send_flags::dontwait)) {
         ++dropped;
         return;
       }
@@ -131,8 +144,12 @@ struct Server::Impl {
 
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::~Server() = default;
-const std::string& Server::endpoint() const { return impl_->endpoint; }
-const SessionCounters& Server::counters() const { return impl_->sessions.counters(); }
+const std::string& Server::endpoint() const {
+  return impl_->endpoint;
+}
+const SessionCounters& Server::counters() const {
+  return impl_->sessions.counters();
+}
 
 Result<std::unique_ptr<Server>> Server::bind(const ServerOptions& options, const ServedScene& scene,
                                              const Method& method, const Reach& reach, Log& log) {
@@ -176,16 +193,22 @@ void Server::run(const std::atomic<bool>& stop) {
     }
   }
   try {
-    for (const Outgoing& farewell : s.sessions.close()) s.send(farewell);
+    for (const Outgoing& farewell : s.sessions.close())
+      s.send(farewell);
     s.give_back();
     s.socket.close();
   } catch (const zmq::error_t& e) {
     s.log.warn("farewell_failed", {{"reason", e.what()}});
   }
   const SessionCounters& c = s.sessions.counters();
-  s.log.info("closed", {{"welcomed", c.welcomed}, {"poses", c.poses}, {"answers", c.answers},
-                        {"superseded", c.superseded}, {"refused", c.refused},
-                        {"malformed", c.malformed}, {"dropped", s.dropped}, {"bytes_out", c.bytes_out}});
+  s.log.info("closed", {{"welcomed", c.welcomed},
+                        {"poses", c.poses},
+                        {"answers", c.answers},
+                        {"superseded", c.superseded},
+                        {"refused", c.refused},
+                        {"malformed", c.malformed},
+                        {"dropped", s.dropped},
+                        {"bytes_out", c.bytes_out}});
 }
 
 }  // namespace ivis::server

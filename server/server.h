@@ -11,32 +11,34 @@
 namespace ivis::server {
 
 struct ServerOptions {
-  std::string listen = "tcp://127.0.0.1:7447";  ///< tcp://HOST:PORT (port * : any free one) or ipc://PATH
-  bool busy_poll = false;  ///< spin instead of sleeping: a core for some tens of microseconds
+  std::string listen =
+      "tcp://127.0.0.1:7447";  ///< tcp://HOST:PORT (port * : any free one) or ipc://PATH
+  bool busy_poll = false;      ///< spin instead of sleeping: a core for some tens of microseconds
   SessionLimits limits;
 };
 
 /// Could a server be bound there now? Errors: those of Server::bind. Leaves nothing behind.
 Status probe_address(const std::string& listen);
 
-/// The socket around a SessionTable: one thread that takes in everything that waits, then answers one
-/// client, and so on; it never blocks on a client.
-/// Threads:   bind() and run() from one thread; `stop` may be set from any, and from a signal handler.
-/// Ownership: borrows scene, method and log.
+/// The socket around a SessionTable: one thread that takes in everything that waits, then answers
+/// one client, and so on; it never blocks on a client. Threads:   bind() and run() from one thread;
+/// `stop` may be set from any, and from a signal handler. Ownership: borrows scene, method and log.
 class Server {
  public:
-  /// Errors: kConnection when the address is taken by a live server or cannot be had; kInvalidArgument
-  /// for one that is not an address. An ipc path that a dead server left behind is taken over.
-  static Result<std::unique_ptr<Server>> bind(const ServerOptions& options, const ServedScene& scene,
-                                              const Method& method, const Reach& reach, Log& log);
+  /// Errors: kConnection when the address is taken by a live server or cannot be had;
+  /// kInvalidArgument for one that is not an address. An ipc path that a dead server left behind is
+  /// taken over.
+  static Result<std::unique_ptr<Server>> bind(const ServerOptions& options,
+                                              const ServedScene& scene, const Method& method,
+                                              const Reach& reach, Log& log);
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
   /// As bound: the port in place of '*'.
   const std::string& endpoint() const;
-  /// Serves until `stop` is set (looked at ten times a second and after every signal), then bids every
-  /// client farewell, sends what is queued, and gives the address back.
+  /// Serves until `stop` is set (looked at ten times a second and after every signal), then bids
+  /// every client farewell, sends what is queued, and gives the address back.
   void run(const std::atomic<bool>& stop);
   const SessionCounters& counters() const;
 

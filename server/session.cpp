@@ -17,7 +17,9 @@ std::string hex(std::uint64_t v) {
   return text;
 }
 
-bool finite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+bool finite(const Vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 /// Unpredictable, so that a restarted server does not know the sessions of the one before it.
 std::mt19937_64 seeded() {
@@ -32,7 +34,8 @@ ServedScene served_scene(const Scene& scene) {
   ServedScene served;
   served.hash = scene.hash;
   served.table.id = rank_order(scene);
-  served.order_hash = XXH3_64bits(served.table.id.data(), served.table.id.size() * sizeof(ObjectId));
+  served.order_hash =
+      XXH3_64bits(served.table.id.data(), served.table.id.size() * sizeof(ObjectId));
   served.rank_of.resize(scene.object_count());
   for (Rank r = 0; r < served.table.id.size(); ++r) {
     const Object& o = scene.objects[served.table.id[r]];
@@ -45,11 +48,15 @@ ServedScene served_scene(const Scene& scene) {
 
 SessionTable::SessionTable(const ServedScene& scene, const Method& method, const Reach& reach,
                            SessionLimits limits)
-    : scene_(scene), method_(method), reach_(reach), limits_(limits), ids_(seeded()),
+    : scene_(scene),
+      method_(method),
+      reach_(reach),
+      limits_(limits),
+      ids_(seeded()),
       nothing_(scene.objects()) {}
 
-std::optional<Outgoing> SessionTable::receive(std::string_view peer, std::span<const std::byte> bytes,
-                                              Time now) {
+std::optional<Outgoing> SessionTable::receive(std::string_view peer,
+                                              std::span<const std::byte> bytes, Time now) {
   auto message = wire::decode(bytes);
   if (!message) {
     ++counters_.malformed;
@@ -62,7 +69,8 @@ std::optional<Outgoing> SessionTable::receive(std::string_view peer, std::span<c
   return refuse(peer, 0, wire::Refusal::kMalformed, "a message that only a server sends");
 }
 
-std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::Hello& hello, Time now) {
+std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::Hello& hello,
+                                             Time now) {
   const auto known = sessions_.find(std::string(peer));
   // A new Hello ends whatever session the peer had, answered well or not.
   const bool queued = known != sessions_.end() && known->second.in_turn;
@@ -71,11 +79,13 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
     return refuse(peer, 0, reason, std::move(text));
   };
   if (hello.version != wire::kProtocolVersion)
-    return turn_away(wire::Refusal::kVersion, "the client speaks version " + std::to_string(hello.version) +
-                                                  ", the server " + std::to_string(wire::kProtocolVersion));
+    return turn_away(wire::Refusal::kVersion, "the client speaks version " +
+                                                  std::to_string(hello.version) + ", the server " +
+                                                  std::to_string(wire::kProtocolVersion));
   if (hello.scene_hash != 0 && hello.scene_hash != scene_.hash)
-    return turn_away(wire::Refusal::kScene, "the client's scene has the hash " + hex(hello.scene_hash) +
-                                                ", the server's " + hex(scene_.hash));
+    return turn_away(wire::Refusal::kScene, "the client's scene has the hash " +
+                                                hex(hello.scene_hash) + ", the server's " +
+                                                hex(scene_.hash));
   Session session;
   session.reach = reach_;
   if (!hello.reach.empty()) {
@@ -83,13 +93,17 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
     if (!wanted) return turn_away(wire::Refusal::kReach, wanted.error().message);
     if (!reach_.contains(*wanted))
       return turn_away(wire::Refusal::kReach, "the client wants " + wanted->to_string() +
-                                                  ", the server's occluders serve up to " + reach_.to_string());
+                                                  ", the server's occluders serve up to " +
+                                                  reach_.to_string());
     session.reach = *wanted;
   }
   if (known == sessions_.end() && sessions_.size() >= limits_.max_sessions)
-    return refuse(peer, 0, wire::Refusal::kBusy,
-                  std::to_string(limits_.max_sessions) + " clients are connected, no more are taken");
-  do session.id = ids_(); while (session.id == 0);
+    return refuse(
+        peer, 0, wire::Refusal::kBusy,
+        std::to_string(limits_.max_sessions) + " clients are connected, no more are taken");
+  do
+    session.id = ids_();
+  while (session.id == 0);
   session.heard = now;
   session.welcome_due = true;
   session.table_wanted = hello.want_table;
@@ -99,10 +113,12 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
   return std::nullopt;
 }
 
-std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::PoseMessage& pose, Time now) {
+std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::PoseMessage& pose,
+                                             Time now) {
   const auto found = sessions_.find(std::string(peer));
   if (found == sessions_.end() || found->second.id != pose.session)
-    return refuse(peer, pose.session, wire::Refusal::kSession, "no such session here: say Hello again");
+    return refuse(peer, pose.session, wire::Refusal::kSession,
+                  "no such session here: say Hello again");
   Session& session = found->second;
   session.heard = now;
   if (!finite(pose.eye) || pose.sequence == 0) {
@@ -193,10 +209,11 @@ std::vector<std::byte> SessionTable::answer(Session& session) {
     m.everything = true;
   } else {
     wire::RankSet set(scene_.objects());
-    for (const ObjectId id : pvs->objects) set.set(scene_.rank_of[id]);
-    const auto base = std::find_if(session.sent.begin(), session.sent.end(), [&](const Remembered& r) {
-      return r.sequence == pose.have_pvs;
-    });
+    for (const ObjectId id : pvs->objects)
+      set.set(scene_.rank_of[id]);
+    const auto base =
+        std::find_if(session.sent.begin(), session.sent.end(),
+                     [&](const Remembered& r) { return r.sequence == pose.have_pvs; });
     const bool known = pose.have_pvs != 0 && base != session.sent.end();
     if (known) {
       // The client holds this one and will not name an older one again.
@@ -218,7 +235,8 @@ std::vector<std::byte> SessionTable::answer(Session& session) {
 std::size_t SessionTable::remembered_limit() const {
   // A state holds two sets (wire/pvs_codec.h) and the model.
   const std::size_t each = sizeof(Remembered) + 2 * nothing_.set.words.size() * 8;
-  return std::max<std::size_t>(2, std::min(limits_.remembered_sets, limits_.remembered_bytes / each));
+  return std::max<std::size_t>(2,
+                               std::min(limits_.remembered_sets, limits_.remembered_bytes / each));
 }
 
 void SessionTable::remember(Session& session, std::uint32_t sequence, wire::PvsState state) {
@@ -242,7 +260,8 @@ std::size_t SessionTable::expire(Time now) {
   std::vector<std::string> silent;
   for (const auto& [peer, session] : sessions_)
     if (now - session.heard > limits_.idle) silent.push_back(peer);
-  for (const std::string& peer : silent) forget(peer);
+  for (const std::string& peer : silent)
+    forget(peer);
   counters_.expired += silent.size();
   return silent.size();
 }

@@ -34,8 +34,8 @@ ServedScene served_scene(const Scene& scene);
 
 struct SessionLimits {
   std::size_t max_sessions = 256;
-  std::chrono::milliseconds idle{60'000};  ///< silence after which a session is over
-  std::size_t remembered_sets = 32;        ///< PVS a session that may become a base
+  std::chrono::milliseconds idle{60'000};    ///< silence after which a session is over
+  std::size_t remembered_sets = 32;          ///< PVS a session that may become a base
   std::size_t remembered_bytes = 4U << 20U;  ///< of them; at least two are kept whatever their size
 };
 
@@ -58,22 +58,23 @@ struct Outgoing {
   std::vector<std::byte> bytes;
 };
 
-/// The sessions of one server: takes messages in with receive(), hands out work a client at a time with
-/// work(). A later pose of a client replaces its earlier one; clients with something to answer take
-/// turns. An answer is coded against the newest PVS the client has acknowledged, so that any message
-/// may be lost.
-/// Threads:   one thread at a time.
-/// Ownership: borrows scene and method.
-/// Limits:    max_sessions, and per session remembered_bytes of sets; a full table refuses with kBusy.
+/// The sessions of one server: takes messages in with receive(), hands out work a client at a time
+/// with work(). A later pose of a client replaces its earlier one; clients with something to answer
+/// take turns. An answer is coded against the newest PVS the client has acknowledged, so that any
+/// message may be lost. Threads:   one thread at a time. Ownership: borrows scene and method.
+/// Limits:    max_sessions, and per session remembered_bytes of sets; a full table refuses with
+/// kBusy.
 class SessionTable {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
   /// `reach`: of a client that wants none of its own, and the largest one that may be asked for.
-  SessionTable(const ServedScene& scene, const Method& method, const Reach& reach, SessionLimits limits);
+  SessionTable(const ServedScene& scene, const Method& method, const Reach& reach,
+               SessionLimits limits);
 
   /// Takes one message of `peer`; never fails: what is wrong comes back as a Refused to send.
-  std::optional<Outgoing> receive(std::string_view peer, std::span<const std::byte> bytes, Time now);
+  std::optional<Outgoing> receive(std::string_view peer, std::span<const std::byte> bytes,
+                                  Time now);
 
   bool work_waiting() const { return !turn_.empty(); }
   /// Answers the next client in turn. Cost: one solve and one encoding.
@@ -110,7 +111,8 @@ class SessionTable {
   std::optional<Outgoing> handle(std::string_view peer, const wire::Hello& hello, Time now);
   std::optional<Outgoing> handle(std::string_view peer, const wire::PoseMessage& pose, Time now);
   std::optional<Outgoing> handle(std::string_view peer, const wire::Bye& bye);
-  Outgoing refuse(std::string_view peer, std::uint64_t session, wire::Refusal reason, std::string text);
+  Outgoing refuse(std::string_view peer, std::uint64_t session, wire::Refusal reason,
+                  std::string text);
   std::vector<std::byte> welcome(Session& session);
   std::vector<std::byte> answer(Session& session);
   void remember(Session& session, std::uint32_t sequence, wire::PvsState state);

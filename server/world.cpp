@@ -34,7 +34,8 @@ Result<std::unique_ptr<World>> load_world(const WorldOptions& options, const Con
     world->occluders = std::move(*set);
   }
   std::string text = options.reach;
-  if (text.empty()) text = options.occluders.empty() ? options.default_reach : world->occluders.reach.to_string();
+  if (text.empty())
+    text = options.occluders.empty() ? options.default_reach : world->occluders.reach.to_string();
   auto reach = Reach::parse(text);
   if (!reach) return reach.error();
   world->reach = *reach;

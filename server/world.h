@@ -29,12 +29,13 @@ struct WorldOptions {
   std::filesystem::path occluders;  ///< empty: shrink here, with the fast builder
   std::string reach;                ///< empty: the occluder file's, or `default_reach`
   std::string default_reach = "cylinder:1.5,0.1";
-  std::string method;               ///< empty: the first of method_list()
-  unsigned threads = 1;             ///< inside one solve
+  std::string method;    ///< empty: the first of method_list()
+  unsigned threads = 1;  ///< inside one solve
 };
 
 /// Errors: those of load_scene, read_occluders, check_occluders, shrink and make_method.
-/// Cost: loading, and shrinking when no file is given: about a second for a city of 1,500 buildings.
+/// Cost: loading, and shrinking when no file is given: about a second for a city of 1,500
+/// buildings.
 Result<std::unique_ptr<World>> load_world(const WorldOptions& options, const Context& context = {});
 
 }  // namespace ivis::server

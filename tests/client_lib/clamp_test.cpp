@@ -10,9 +10,9 @@
 namespace ivis::client {
 namespace {
 
-const std::vector<std::string> kReaches{"ball:1.5", "disc:1",   "cylinder:1.5,0.1", "ellipsoid:2,0.3,1",
-                                        "box:1,2,3", "ball:0",  "disc:0",           "ellipsoid:1,0,2",
-                                        "box:0,0,0", "cylinder:0,2"};
+const std::vector<std::string> kReaches{
+    "ball:1.5", "disc:1", "cylinder:1.5,0.1", "ellipsoid:2,0.3,1", "box:1,2,3",
+    "ball:0",   "disc:0", "ellipsoid:1,0,2",  "box:0,0,0",         "cylinder:0,2"};
 
 class Clamp : public ::testing::TestWithParam<std::string> {};
 

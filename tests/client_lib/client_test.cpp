@@ -72,7 +72,8 @@ TEST_F(ClientOverTcp, BeforeTheFirstAnswerEverythingIsVisibleAndCounted) {
   ivis_client_options options = ivis_client_options_default();
   options.endpoint = "tcp://127.0.0.1:1";  // nobody
   options.connect_timeout_ms = 0;
-  for (const ivis_policy policy : {IVIS_POLICY_EVERYTHING, IVIS_POLICY_STALL, IVIS_POLICY_INCOMPLETE}) {
+  for (const ivis_policy policy :
+       {IVIS_POLICY_EVERYTHING, IVIS_POLICY_STALL, IVIS_POLICY_INCOMPLETE}) {
     options.policy = policy;
     auto client = VisibilityClient::connect(options);
     ASSERT_TRUE(client) << client.error();
@@ -139,7 +140,8 @@ TEST_F(ClientOverTcp, StallNeverLeavesTheCell) {
   ASSERT_EQ(client.wait(kWait), IVIS_OK);
   const ViewCell cell{{4, 1, 4}, Reach::cylinder(1.5, 0.1)};
   for (int i = 0; i < 200; ++i) {
-    const double eye[3]{4 + 3 * std::sin(i * 1.0), 1 + 2 * std::sin(i * 0.3), 4 + 5 * std::cos(i * 0.7)};
+    const double eye[3]{4 + 3 * std::sin(i * 1.0), 1 + 2 * std::sin(i * 0.3),
+                        4 + 5 * std::cos(i * 0.7)};
     const PvsView view = client.view(eye);
     EXPECT_TRUE(cell.contains({view.eye()[0], view.eye()[1], view.eye()[2]}));
     EXPECT_TRUE(view.covered());
@@ -213,7 +215,8 @@ TEST_F(ClientOverTcp, ManyClientsGetTheirOwnSets) {
       }
     });
   }
-  for (auto& t : threads) t.join();
+  for (auto& t : threads)
+    t.join();
   EXPECT_EQ(wrong, 0);
 }
 
@@ -221,7 +224,8 @@ TEST_F(ClientOverTcp, FramesWithoutWaitingEndInTheRightSet) {
   RunningServer server(scene, method);
   auto client = connect(server.endpoint());
   ASSERT_TRUE(client);
-  for (int i = 0; i < 5000; ++i) client.frame({0.005 * i, 1, 10});
+  for (int i = 0; i < 5000; ++i)
+    client.frame({0.005 * i, 1, 10});
   ASSERT_EQ(client.wait(kWait), IVIS_OK) << client.error();
   const double last[3]{0.005 * 4999, 1, 10};
   EXPECT_EQ(ids(client.view(last)), solved(method, last));

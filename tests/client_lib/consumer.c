@@ -35,7 +35,8 @@ int main(int argc, char** argv) {
   }
   ivis_client_close(client);
   options.scene_file = "/nonexistent.glb";
-  if (ivis_local_open(&options, &client, error, sizeof error) == IVIS_OK || client != NULL) return 11;
+  if (ivis_local_open(&options, &client, error, sizeof error) == IVIS_OK || client != NULL)
+    return 11;
   printf("%s\n", error);
   return 0;
 }

@@ -12,7 +12,8 @@ namespace ivis::test {
 namespace {
 
 TEST(CConsumer, WalksInProcessThroughThePublicHeaders) {
-  const auto scene = std::filesystem::path(::testing::TempDir()) / ("ivis_consumer_" + std::to_string(getpid()) + ".glb");
+  const auto scene = std::filesystem::path(::testing::TempDir()) /
+                     ("ivis_consumer_" + std::to_string(getpid()) + ".glb");
   write_tiny_glb(scene, 5);
   Process p({IVIS_CONSUMER, scene.string()});
   EXPECT_EQ(p.finish(), 0) << p.output();

@@ -19,7 +19,8 @@ class LocalClient : public ::testing::Test {
     world.reach = Reach::disc(1);
     world.catalogue = client::catalogue_of(scene, world.reach, *method);
     world.method = method;
-    client = ivis_client_adopt_source_(client::make_local_source(world).release(), IVIS_POLICY_EVERYTHING);
+    client = ivis_client_adopt_source_(client::make_local_source(world).release(),
+                                       IVIS_POLICY_EVERYTHING);
   }
   void TearDown() override { ivis_client_close(client); }
 

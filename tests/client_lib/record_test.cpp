@@ -67,18 +67,25 @@ TEST(Record, ErrorsNameFileLineFoundAndExpected) {
     EXPECT_FALSE(r) << text;
     return r ? "" : r.error().message;
   };
-  EXPECT_THAT(error_of("nonsense"), HasSubstr("'walk.rec' line 1: found 'nonsense', expected 'ivis-record 1'"));
+  EXPECT_THAT(error_of("nonsense"),
+              HasSubstr("'walk.rec' line 1: found 'nonsense', expected 'ivis-record 1'"));
   EXPECT_THAT(error_of("ivis-record 1\nscene 12\n"), HasSubstr("line 2"));
-  EXPECT_THAT(error_of("ivis-record 1\nscene 0123456789abcdef\nreach disk:1\n"), HasSubstr("disk:1"));
-  EXPECT_THAT(error_of(head + "frame 0 0 0 0 0 nan covered 0"), HasSubstr("line 5: the eye: found 'nan'"));
+  EXPECT_THAT(error_of("ivis-record 1\nscene 0123456789abcdef\nreach disk:1\n"),
+              HasSubstr("disk:1"));
+  EXPECT_THAT(error_of(head + "frame 0 0 0 0 0 nan covered 0"),
+              HasSubstr("line 5: the eye: found 'nan'"));
   EXPECT_THAT(error_of(head + "frame 0 0 0 0 0"), HasSubstr("line 5"));
   EXPECT_THAT(error_of(head + "frame 0 0 0 0 0 0 perhaps 0"), HasSubstr("found 'perhaps'"));
   EXPECT_THAT(error_of(head + "frame 0 0 0 2 0 0 covered 1 3"), HasSubstr("outside its cell"));
-  EXPECT_THAT(error_of(head + "frame 0 0 0 0 0 0 covered 2 3 0"), HasSubstr("found '0' as id or gap"));
-  EXPECT_THAT(error_of(head + "frame 0 0 0 0 0 0 covered 2 3 17"), HasSubstr("found '17' as id or gap"));
-  EXPECT_THAT(error_of(head + "frame 0 0 0 0 0 0 covered 2 3 4294967295"), HasSubstr("as id or gap"));
+  EXPECT_THAT(error_of(head + "frame 0 0 0 0 0 0 covered 2 3 0"),
+              HasSubstr("found '0' as id or gap"));
+  EXPECT_THAT(error_of(head + "frame 0 0 0 0 0 0 covered 2 3 17"),
+              HasSubstr("found '17' as id or gap"));
+  EXPECT_THAT(error_of(head + "frame 0 0 0 0 0 0 covered 2 3 4294967295"),
+              HasSubstr("as id or gap"));
   EXPECT_THAT(error_of(head + "frame 0 0 0 0 0 0 covered 3 3 1"), HasSubstr("number of ids"));
-  EXPECT_THAT(error_of(head + "frame 0 0 0 0 0 0 covered 4000000000 3 1"), HasSubstr("number of ids"));
+  EXPECT_THAT(error_of(head + "frame 0 0 0 0 0 0 covered 4000000000 3 1"),
+              HasSubstr("number of ids"));
   EXPECT_THAT(error_of(head + "frame 0 0 0 0 0 0 covered 1 3 1"), HasSubstr("after the last id"));
 }
 
@@ -92,7 +99,8 @@ TEST(Record, DamagedTextNeverCrashes) {
     const auto r = decode_record(text, "r");
     if (!r) continue;
     for (const RecordedFrame& f : r->frames)
-      for (const ObjectId id : f.pvs.objects) ASSERT_LT(id, r->objects);
+      for (const ObjectId id : f.pvs.objects)
+        ASSERT_LT(id, r->objects);
   }
 }
 

@@ -15,7 +15,8 @@ constexpr int kWait = 20'000;  // ms; only ever waited out by a failure
 class ClientAndKilledServer : public ::testing::Test {
  protected:
   void start(int grid, const std::string& address) {
-    server = std::make_unique<Process>(std::vector<std::string>{IVIS_GRID_SERVER, address, std::to_string(grid)});
+    server = std::make_unique<Process>(
+        std::vector<std::string>{IVIS_GRID_SERVER, address, std::to_string(grid)});
     ASSERT_TRUE(server->says("event=listening") && server->says("\n")) << server->output();
     endpoint = word_after(server->output(), "address=");
   }

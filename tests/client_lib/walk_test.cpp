@@ -13,14 +13,16 @@ namespace {
 class Walk : public ::testing::Test {
  protected:
   Walk() {
-    for (int i = 0; i < 60; ++i) path.push_back({0.1 * i, {2.0 + 0.5 * i, 1, 10}, 0, 0});
+    for (int i = 0; i < 60; ++i)
+      path.push_back({0.1 * i, {2.0 + 0.5 * i, 1, 10}, 0, 0});
   }
   void TearDown() override { std::filesystem::remove(file); }
   Scene scene = grid_scene(20);
   NearMethod method{scene};
   std::vector<Pose> path;
-  std::filesystem::path file = std::filesystem::path(::testing::TempDir()) /
-                               (std::string("ivis_walk_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  std::filesystem::path file =
+      std::filesystem::path(::testing::TempDir()) /
+      (std::string("ivis_walk_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
 };
 
 TEST_F(Walk, WithoutPaceEveryPoseIsCoveredByItsOwnAnswer) {
@@ -28,7 +30,8 @@ TEST_F(Walk, WithoutPaceEveryPoseIsCoveredByItsOwnAnswer) {
   WalkOptions options;
   options.record_file = file;
   std::size_t rows = 0;
-  const auto r = walk(server.endpoint(), path, options, {}, [&](const WalkProgress& p) { rows = p.done; });
+  const auto r =
+      walk(server.endpoint(), path, options, {}, [&](const WalkProgress& p) { rows = p.done; });
   ASSERT_TRUE(r) << r.error().message;
   EXPECT_EQ(rows, path.size());
   EXPECT_EQ(r->poses, path.size());
@@ -38,7 +41,8 @@ TEST_F(Walk, WithoutPaceEveryPoseIsCoveredByItsOwnAnswer) {
   EXPECT_EQ(r->objects, scene.object_count());
   EXPECT_EQ(r->method, "near");
   server.stop();
-  EXPECT_DOUBLE_EQ(r->bytes_mean * static_cast<double>(path.size()), static_cast<double>(server.counters().bytes_out));
+  EXPECT_DOUBLE_EQ(r->bytes_mean * static_cast<double>(path.size()),
+                   static_cast<double>(server.counters().bytes_out));
 
   const auto record = client::read_record(file);
   ASSERT_TRUE(record) << record.error().message;
@@ -56,7 +60,8 @@ TEST_F(Walk, PacedStallingWalkDrawsFromWithinItsCellsOnly) {
   WalkOptions options;
   options.hz = 500;
   options.record_file = file;
-  for (Pose& p : path) p.eye.x *= 5;  // further a row than the reach
+  for (Pose& p : path)
+    p.eye.x *= 5;  // further a row than the reach
   const auto r = walk(server.endpoint(), path, options);
   ASSERT_TRUE(r) << r.error().message;
   EXPECT_GT(r->stalls, 0U);
@@ -79,7 +84,8 @@ TEST_F(Walk, PacedIncompleteWalkCountsItsUncoveredFrames) {
   WalkOptions options;
   options.hz = 500;
   options.policy = WalkOptions::Policy::kIncomplete;
-  for (Pose& p : path) p.eye.x *= 5;
+  for (Pose& p : path)
+    p.eye.x *= 5;
   const auto r = walk(server.endpoint(), path, options);
   ASSERT_TRUE(r) << r.error().message;
   EXPECT_GT(r->uncovered_frames, 0U);

@@ -21,8 +21,10 @@ Environment variables(std::map<std::string, std::string> values) {
 
 class ConfigFile : public ::testing::Test {
  protected:
-  std::filesystem::path file = std::filesystem::path(::testing::TempDir()) /
-                               (std::string("ivisd_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".toml");
+  std::filesystem::path file =
+      std::filesystem::path(::testing::TempDir()) /
+      (std::string("ivisd_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() +
+       ".toml");
   void TearDown() override { std::filesystem::remove(file); }
   void write(const std::string& text) { std::ofstream(file) << text; }
   std::string error_of(const std::string& text) {
@@ -35,14 +37,16 @@ class ConfigFile : public ::testing::Test {
 
 TEST_F(ConfigFile, FlagGoesOverEnvironmentOverFileOverDefault) {
   write("reach = \"disc:3\"\nthreads = 3\nlog_level = \"warn\"\n");
-  const auto c = configure({{"reach", "disc:1"}}, variables({{"IVISD_REACH", "disc:2"}, {"IVISD_THREADS", "2"}}), file);
+  const auto c = configure({{"reach", "disc:1"}},
+                           variables({{"IVISD_REACH", "disc:2"}, {"IVISD_THREADS", "2"}}), file);
   ASSERT_TRUE(c) << c.error().message;
   EXPECT_EQ(c->config.reach, "disc:1");
   EXPECT_EQ(c->config.threads, 2U);
   EXPECT_EQ(c->config.log_level, LogLevel::kWarn);
   EXPECT_EQ(c->config.listen, "tcp://127.0.0.1:7447");
   std::map<std::string, std::string> origin;
-  for (const Setting& s : c->settings) origin[s.key] = s.origin;
+  for (const Setting& s : c->settings)
+    origin[s.key] = s.origin;
   EXPECT_EQ(origin["reach"], "flag --reach");
   EXPECT_EQ(origin["threads"], "environment IVISD_THREADS");
   EXPECT_EQ(origin["log_level"], file.string() + ":3");
@@ -50,13 +54,17 @@ TEST_F(ConfigFile, FlagGoesOverEnvironmentOverFileOverDefault) {
 }
 
 TEST_F(ConfigFile, UnknownKeyIsAnErrorThatNamesFileLineAndKey) {
-  EXPECT_THAT(error_of("threads = 1\n\nraech = \"disc:1\"\n"), HasSubstr(file.string() + ":3: unknown key 'raech'"));
+  EXPECT_THAT(error_of("threads = 1\n\nraech = \"disc:1\"\n"),
+              HasSubstr(file.string() + ":3: unknown key 'raech'"));
   EXPECT_THAT(error_of("[server]\nthreads = 1\n"), HasSubstr("unknown key 'server'"));
 }
 
 TEST_F(ConfigFile, WrongValuesNameLineKeyFoundAndExpected) {
-  EXPECT_THAT(error_of("\nthreads = \"two\"\n"), HasSubstr(":2: key 'threads': found a value of type string, expected a whole number"));
-  EXPECT_THAT(error_of("threads = 0"), HasSubstr("found '0', expected a whole number from 1 to 256"));
+  EXPECT_THAT(
+      error_of("\nthreads = \"two\"\n"),
+      HasSubstr(":2: key 'threads': found a value of type string, expected a whole number"));
+  EXPECT_THAT(error_of("threads = 0"),
+              HasSubstr("found '0', expected a whole number from 1 to 256"));
   EXPECT_THAT(error_of("threads = -1"), HasSubstr("found '-1'"));
   EXPECT_THAT(error_of("reach = \"disk:1\""), HasSubstr("disk:1"));
   EXPECT_THAT(error_of("listen = \"http://x\""), HasSubstr("expected tcp://"));
@@ -84,16 +92,19 @@ TEST_F(ConfigFile, RelativePathsAreRelativeToTheFile) {
 }
 
 TEST_F(ConfigFile, PrintedConfigurationReadsBackTheSame) {
-  const auto c = configure({{"scene", "/s \"quoted\".glb"}, {"threads", "7"}, {"busy_poll", "true"}}, variables({}), {});
+  const auto c = configure(
+      {{"scene", "/s \"quoted\".glb"}, {"threads", "7"}, {"busy_poll", "true"}}, variables({}), {});
   ASSERT_TRUE(c);
   write(to_string(*c));
   const auto again = configure({}, variables({}), file);
   ASSERT_TRUE(again) << again.error().message;
-  for (std::size_t i = 0; i < c->settings.size(); ++i) EXPECT_EQ(c->settings[i].value, again->settings[i].value);
+  for (std::size_t i = 0; i < c->settings.size(); ++i)
+    EXPECT_EQ(c->settings[i].value, again->settings[i].value);
 }
 
 TEST(Config, AMistakeInAFlagIsAnArgumentErrorOneInTheEnvironmentIsInput) {
-  EXPECT_EQ(configure({{"reach", "x"}}, variables({}), {}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(configure({{"reach", "x"}}, variables({}), {}).error().code,
+            ErrorCode::kInvalidArgument);
   const auto c = configure({}, variables({{"IVISD_MAX_CLIENTS", "many"}}), {});
   EXPECT_EQ(c.error().code, ErrorCode::kInput);
   EXPECT_THAT(c.error().message, HasSubstr("environment IVISD_MAX_CLIENTS"));
@@ -106,7 +117,8 @@ TEST(Config, AbsentFileIsAnError) {
 TEST(Log, BytesFromOutsideBreakNeitherLineNorJson) {
   EXPECT_EQ(format_event("e", {{"text", "a \"b\"\n\x01"}, {"n", 3}}, false),
             "event=e text=\"a \\\"b\\\"\\u000a\\u0001\" n=3");
-  EXPECT_EQ(format_event("e", {{"text", "a\nb"}, {"n", 3}}, true), "\"event\":\"e\",\"text\":\"a\\u000ab\",\"n\":3");
+  EXPECT_EQ(format_event("e", {{"text", "a\nb"}, {"n", 3}}, true),
+            "\"event\":\"e\",\"text\":\"a\\u000ab\",\"n\":3");
 }
 
 }  // namespace

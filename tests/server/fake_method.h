@@ -11,7 +11,8 @@ namespace ivis::test {
 
 class NearMethod : public Method {
  public:
-  explicit NearMethod(const Scene& scene, double radius_m = 10) : scene_(scene), radius_m_(radius_m) {}
+  explicit NearMethod(const Scene& scene, double radius_m = 10)
+      : scene_(scene), radius_m_(radius_m) {}
 
   const MethodTraits& traits() const override { return traits_; }
   Result<Pvs> solve(const ViewCell& cell) const override {

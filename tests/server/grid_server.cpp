@@ -21,7 +21,8 @@ int main(int argc, char** argv) {
   ivis::server::Log log(ivis::server::LogLevel::kInfo, false);
   ivis::server::ServerOptions options;
   options.listen = argv[1];
-  auto server = ivis::server::Server::bind(options, served, method, ivis::Reach::cylinder(1.5, 0.1), log);
+  auto server =
+      ivis::server::Server::bind(options, served, method, ivis::Reach::cylinder(1.5, 0.1), log);
   if (!server) {
     std::fprintf(stderr, "%s\n", server.error().message.c_str());
     return 4;

@@ -25,12 +25,14 @@ class Daemon : public ::testing::Test {
   }
   ~Daemon() override { std::filesystem::remove_all(folder); }
 
-  std::unique_ptr<Process> start(std::vector<std::string> arguments, const std::vector<std::string>& environment = {}) {
+  std::unique_ptr<Process> start(std::vector<std::string> arguments,
+                                 const std::vector<std::string>& environment = {}) {
     arguments.insert(arguments.begin(), IVIS_DAEMON);
     return std::make_unique<Process>(arguments, environment);
   }
   /// Runs to the end.
-  int run(const std::vector<std::string>& arguments, const std::vector<std::string>& environment = {}) {
+  int run(const std::vector<std::string>& arguments,
+          const std::vector<std::string>& environment = {}) {
     const auto p = start(arguments, environment);
     const int code = p->finish();
     output = p->output();
@@ -48,7 +50,8 @@ class Daemon : public ::testing::Test {
     options.connect_timeout_ms = 20'000;
     return VisibilityClient::connect(options);
   }
-  std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / ("ivisd_test_" + std::to_string(getpid()));
+  std::filesystem::path folder =
+      std::filesystem::path(::testing::TempDir()) / ("ivisd_test_" + std::to_string(getpid()));
   std::filesystem::path scene = folder / "tiny.glb";
   std::string output;
 };
@@ -56,7 +59,8 @@ class Daemon : public ::testing::Test {
 TEST_F(Daemon, ServesASceneAndDrainsOnTermination) {
   for (const int signal : {SIGTERM, SIGINT}) {
     const auto daemon = serve("tcp://127.0.0.1:*");
-    auto client = connect(word_after(daemon->output().substr(daemon->output().find("event=listening")), "address="));
+    auto client = connect(
+        word_after(daemon->output().substr(daemon->output().find("event=listening")), "address="));
     ASSERT_TRUE(client) << client.error();
     EXPECT_EQ(client.info()->object_count, 5U);
     EXPECT_STREQ(client.info()->reach, "cylinder:1.5,0.1");
@@ -77,7 +81,8 @@ TEST_F(Daemon, ASecondOneOnTheSameAddressSaysSoAndExits4) {
   const std::string ipc = "ipc://" + (folder / "s").string();
   for (const std::string& address : {std::string("tcp://127.0.0.1:*"), ipc}) {
     const auto first = serve(address);
-    const std::string bound = word_after(first->output().substr(first->output().find("event=listening")), "address=");
+    const std::string bound =
+        word_after(first->output().substr(first->output().find("event=listening")), "address=");
     EXPECT_EQ(run({"--scene", scene.string(), "--listen", bound}), 4);
     EXPECT_THAT(output, HasSubstr("another server already listens on " + bound));
     EXPECT_TRUE(connect(bound)) << "the first one lives on";
@@ -99,7 +104,8 @@ TEST_F(Daemon, TakesOverTheSocketOfAKilledOne) {
 
 TEST_F(Daemon, HelpTeachesWithAnExample) {
   EXPECT_EQ(run({"--help"}), 0);
-  for (const char* word : {"Example:", "--occluders", "--listen", "--check-config", "IVISD_", "cylinder:r,h", "Exit codes"})
+  for (const char* word : {"Example:", "--occluders", "--listen", "--check-config", "IVISD_",
+                           "cylinder:r,h", "Exit codes"})
     EXPECT_THAT(output, HasSubstr(word));
 }
 
@@ -129,7 +135,8 @@ TEST_F(Daemon, BadInputExits3) {
 TEST_F(Daemon, CheckConfigShowsWhereEachValueComesFrom) {
   std::ofstream(folder / "d.toml") << "scene = \"tiny.glb\"\nthreads = 2\nreach = \"disc:2\"\n";
   const std::string file = (folder / "d.toml").string();
-  EXPECT_EQ(run({"--config", file, "--check-config", "--log-level", "warn"}, {"IVISD_REACH=disc:1"}), 0);
+  EXPECT_EQ(
+      run({"--config", file, "--check-config", "--log-level", "warn"}, {"IVISD_REACH=disc:1"}), 0);
   EXPECT_THAT(output, HasSubstr("threads = 2"));
   EXPECT_THAT(output, HasSubstr("# " + file + ":2"));
   EXPECT_THAT(output, HasSubstr("# environment IVISD_REACH"));

@@ -8,11 +8,12 @@
 
 namespace ivis::test {
 
-/// A program run by a test: its output (both streams) is read as it comes. Killed when it goes out of
-/// scope.
+/// A program run by a test: its output (both streams) is read as it comes. Killed when it goes out
+/// of scope.
 class Process {
  public:
-  explicit Process(const std::vector<std::string>& command, const std::vector<std::string>& environment = {});
+  explicit Process(const std::vector<std::string>& command,
+                   const std::vector<std::string>& environment = {});
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;

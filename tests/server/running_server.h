@@ -14,7 +14,8 @@ namespace ivis::test {
 /// A server on a thread of its own; any free port unless told otherwise.
 class RunningServer {
  public:
-  RunningServer(const Scene& scene, const Method& method, const Reach& reach = Reach::cylinder(1.5, 0.1),
+  RunningServer(const Scene& scene, const Method& method,
+                const Reach& reach = Reach::cylinder(1.5, 0.1),
                 const std::string& listen = "tcp://127.0.0.1:*", server::SessionLimits limits = {})
       : served_(server::served_scene(scene)), log_(server::LogLevel::kOff, false) {
     server::ServerOptions options;

@@ -32,7 +32,8 @@ class RawPeer {
     socket_.connect(endpoint);
   }
   void send(std::span<const std::byte> bytes, bool more = false) {
-    socket_.send(zmq::buffer(bytes.data(), bytes.size()), more ? zmq::send_flags::sndmore : zmq::send_flags::none);
+    socket_.send(zmq::buffer(bytes.data(), bytes.size()),
+                 more ? zmq::send_flags::sndmore : zmq::send_flags::none);
   }
   void send(const wire::Message& m) { send(wire::encode(m)); }
   std::optional<wire::Message> receive() {
@@ -75,7 +76,8 @@ TEST_F(ServerSocket, HostilePeersDoNotDisturbAnother) {
   std::uint32_t sequence = 0;
   for (int round = 0; round < 20; ++round) {
     std::vector<std::byte> garbage(random() % 5000);
-    for (auto& b : garbage) b = static_cast<std::byte>(random());
+    for (auto& b : garbage)
+      b = static_cast<std::byte>(random());
     evil.send(garbage);
     evil.send(garbage, true);  // several frames
     evil.send(garbage, true);
@@ -208,7 +210,8 @@ TEST_F(Address, NonsenseIsNamed) {
   EXPECT_EQ(bind_error("tcp://nonsense").code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(bind_error("ipc://").code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(bind_error("ipc://" + std::string(300, 'x')).code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(bind_error("ipc:///nonexistent/folder/s").message, HasSubstr("/nonexistent/folder/s"));
+  EXPECT_THAT(bind_error("ipc:///nonexistent/folder/s").message,
+              HasSubstr("/nonexistent/folder/s"));
 }
 
 }  // namespace

@@ -56,7 +56,8 @@ class Sessions : public ::testing::Test {
     peer.id_of = welcome.table.id;
     return peer;
   }
-  std::optional<wire::Message> pose(const Peer& peer, std::uint32_t sequence, const Vec3& eye, std::uint32_t have = 0) {
+  std::optional<wire::Message> pose(const Peer& peer, std::uint32_t sequence, const Vec3& eye,
+                                    std::uint32_t have = 0) {
     return say(peer, wire::PoseMessage{peer.session, sequence, have, eye});
   }
   /// The next message of the server, which must be a PVS for `peer`.
@@ -69,7 +70,8 @@ class Sessions : public ::testing::Test {
     return std::get<wire::PvsMessage>(m);
   }
   std::vector<ObjectId> ids(Peer& peer, const wire::PvsMessage& m) {
-    const wire::PvsState base = m.base == 0 ? wire::PvsState(served.objects()) : peer.states.at(m.base);
+    const wire::PvsState base =
+        m.base == 0 ? wire::PvsState(served.objects()) : peer.states.at(m.base);
     auto state = wire::decode_pvs(m.payload, base);
     EXPECT_TRUE(state);
     std::vector<ObjectId> out;
@@ -79,7 +81,9 @@ class Sessions : public ::testing::Test {
     peer.states.insert_or_assign(m.sequence, *state);
     return out;
   }
-  std::vector<ObjectId> truth(const Vec3& eye) { return method.solve({eye, Reach::disc(2)})->objects; }
+  std::vector<ObjectId> truth(const Vec3& eye) {
+    return method.solve({eye, Reach::disc(2)})->objects;
+  }
   static Refusal reason(const std::optional<wire::Message>& m) {
     const auto* refused = m ? std::get_if<wire::Refused>(&*m) : nullptr;
     EXPECT_NE(refused, nullptr);
@@ -96,7 +100,8 @@ TEST_F(Sessions, WelcomeNamesEveryObject) {
   EXPECT_EQ(w.reach, "disc:2");
   EXPECT_NE(w.session, 0U);
   ASSERT_EQ(w.table.id.size(), scene.object_count());
-  for (Rank r = 0; r < w.objects; ++r) EXPECT_EQ(w.table.node[r], scene.objects[w.table.id[r]].node);
+  for (Rank r = 0; r < w.objects; ++r)
+    EXPECT_EQ(w.table.node[r], scene.objects[w.table.id[r]].node);
 }
 
 TEST_F(Sessions, FirstAnswerIsFullAndLaterOnesDiffer) {
@@ -145,7 +150,8 @@ TEST_F(Sessions, AcknowledgedSetOutlivesAFullMemory) {
 TEST_F(Sessions, LatestPoseWins) {
   Peer a = greet("a");
   const int solves = method.solves;
-  for (std::uint32_t s = 1; s <= 10; ++s) pose(a, s, {1.0 * s, 1, 4});
+  for (std::uint32_t s = 1; s <= 10; ++s)
+    pose(a, s, {1.0 * s, 1, 4});
   EXPECT_EQ(next_pvs(a).sequence, 10U);
   EXPECT_EQ(method.solves, solves + 1);
   EXPECT_FALSE(table().work());
@@ -166,7 +172,8 @@ TEST_F(Sessions, ClientsTakeTurns) {
   Peer b = greet("b");
   Peer c = greet("c");
   std::uint32_t s = 0;
-  for (const Peer* p : {&a, &b, &c}) pose(*p, 1, {4, 1, 4});
+  for (const Peer* p : {&a, &b, &c})
+    pose(*p, 1, {4, 1, 4});
   for (int round = 0; round < 3; ++round) {
     for (const Peer* p : {&a, &b, &c}) {
       next_pvs(*p);
@@ -189,7 +196,8 @@ TEST_F(Sessions, UnsolvablePoseIsAnsweredWithEverything) {
 TEST_F(Sessions, RefusesUnknownSession) {
   EXPECT_EQ(reason(say({"x", 0, {}, {}}, wire::PoseMessage{77, 1, 0, {}})), Refusal::kSession);
   Peer a = greet("a");
-  EXPECT_EQ(reason(say({"b", 0, {}, {}}, wire::PoseMessage{a.session, 1, 0, {}})), Refusal::kSession)
+  EXPECT_EQ(reason(say({"b", 0, {}, {}}, wire::PoseMessage{a.session, 1, 0, {}})),
+            Refusal::kSession)
       << "a session belongs to the peer that began it";
   EXPECT_EQ(reason(say(a, wire::PoseMessage{a.session + 1, 1, 0, {}})), Refusal::kSession);
   EXPECT_FALSE(table().work_waiting());
@@ -231,7 +239,8 @@ TEST_F(Sessions, GarbageIsRefusedAndCountedAndEndsNothing) {
   std::mt19937 random(7);
   for (int i = 0; i < 2000; ++i) {
     std::vector<std::byte> bytes(random() % 200);
-    for (auto& b : bytes) b = static_cast<std::byte>(random());
+    for (auto& b : bytes)
+      b = static_cast<std::byte>(random());
     table().receive(i % 2 == 0 ? "a" : "evil", bytes, now);
   }
   EXPECT_EQ(table().counters().malformed, 2000U);
@@ -245,8 +254,9 @@ TEST_F(Sessions, DamagedMessagesNeverCrash) {
   std::mt19937 random(11);
   wire::Hello hello;
   hello.reach = "disc:1";
-  for (const wire::Message& m : {wire::Message(hello), wire::Message(wire::PoseMessage{a.session, 1, 0, {4, 1, 4}}),
-                                 wire::Message(wire::Bye{a.session})}) {
+  for (const wire::Message& m :
+       {wire::Message(hello), wire::Message(wire::PoseMessage{a.session, 1, 0, {4, 1, 4}}),
+        wire::Message(wire::Bye{a.session})}) {
     const auto sound = wire::encode(m);
     for (int i = 0; i < 3000; ++i) {
       auto bytes = sound;
@@ -272,7 +282,8 @@ TEST_F(Sessions, RefusesAPoseWithoutSequence) {
 
 TEST_F(Sessions, TakesNoMoreThanItsLimit) {
   limits.max_sessions = 3;
-  for (const char* name : {"a", "b", "c"}) greet(name);
+  for (const char* name : {"a", "b", "c"})
+    greet(name);
   EXPECT_EQ(reason(say({"d", 0, {}, {}}, wire::Hello{})), Refusal::kBusy);
   greet("b");  // a known peer may greet again
   EXPECT_EQ(table().size(), 3U);
@@ -317,10 +328,13 @@ TEST_F(Sessions, ByeAndCloseEndSessions) {
 
 TEST_F(Sessions, AFloodOfGreetingsStaysWithinBounds) {
   limits.max_sessions = 4;
-  for (int i = 0; i < 1000; ++i) say({std::to_string(i), 0, {}, {}}, wire::Hello{});
-  for (int i = 0; i < 1000; ++i) say({"0", 0, {}, {}}, wire::Hello{});
+  for (int i = 0; i < 1000; ++i)
+    say({std::to_string(i), 0, {}, {}}, wire::Hello{});
+  for (int i = 0; i < 1000; ++i)
+    say({"0", 0, {}, {}}, wire::Hello{});
   int answered = 0;
-  while (table().work()) ++answered;
+  while (table().work())
+    ++answered;
   EXPECT_EQ(answered, 4);
 }
 

@@ -1,19 +1,17 @@
 /* ivis client library: poses out, visible objects in. C99.
  *
- * A client connects to a visibility server, tells it once a frame where the eye is, and is told which
- * objects can be seen from anywhere the eye can get to before the next answer (the view cell: the eye
- * plus the session's reach). Nothing here waits for the network but ivis_client_connect() and
- * ivis_client_wait().
+ * A client connects to a visibility server, tells it once a frame where the eye is, and is told
+ * which objects can be seen from anywhere the eye can get to before the next answer (the view cell:
+ * the eye plus the session's reach). Nothing here waits for the network but ivis_client_connect()
+ * and ivis_client_wait().
  *
  *     ivis_client_options options = ivis_client_options_default();
  *     ivis_client* client = NULL;
  *     char error[256];
- *     if (ivis_client_connect(&options, &client, error, sizeof error) != IVIS_OK) return fail(error);
- *     while (running) {
- *       ivis_frame frame;
- *       ivis_client_frame(client, eye, &frame);
- *       for (uint32_t id = 0; id < object_count; ++id)
- *         if (ivis_frame_visible(&frame, id)) draw(id, frame.eye);
+ *     if (ivis_client_connect(&options, &client, error, sizeof error) != IVIS_OK) return
+ * fail(error); while (running) { ivis_frame frame; ivis_client_frame(client, eye, &frame); for
+ * (uint32_t id = 0; id < object_count; ++id) if (ivis_frame_visible(&frame, id)) draw(id,
+ * frame.eye);
  *     }
  *     ivis_client_close(client);
  *
@@ -45,26 +43,26 @@ typedef struct ivis_client ivis_client;
 
 typedef enum ivis_status {
   IVIS_OK = 0,
-  IVIS_ERROR_ARGUMENT = 1,    /* a value the caller gave cannot be used */
-  IVIS_ERROR_INPUT = 2,       /* a file's or a message's bytes are not what they should be */
-  IVIS_ERROR_IO = 3,          /* a file cannot be opened or read */
-  IVIS_ERROR_MISMATCH = 4,    /* the server has another scene, version or reach: final */
-  IVIS_ERROR_CONNECTION = 5,  /* the server is absent, silent or gone; the client keeps trying */
-  IVIS_ERROR_TIMEOUT = 6      /* what was waited for did not come in time */
+  IVIS_ERROR_ARGUMENT = 1,   /* a value the caller gave cannot be used */
+  IVIS_ERROR_INPUT = 2,      /* a file's or a message's bytes are not what they should be */
+  IVIS_ERROR_IO = 3,         /* a file cannot be opened or read */
+  IVIS_ERROR_MISMATCH = 4,   /* the server has another scene, version or reach: final */
+  IVIS_ERROR_CONNECTION = 5, /* the server is absent, silent or gone; the client keeps trying */
+  IVIS_ERROR_TIMEOUT = 6     /* what was waited for did not come in time */
 } ivis_status;
 
 /* What a client does when the eye is outside the cell of the PVS it has. */
 typedef enum ivis_policy {
   IVIS_POLICY_EVERYTHING = 0, /* every object is visible until the next PVS arrives; default */
-  IVIS_POLICY_STALL = 1,      /* frame.eye is held at the border of the cell, and is covered there */
-  IVIS_POLICY_INCOMPLETE = 2  /* the old PVS is used on; objects may be missing */
+  IVIS_POLICY_STALL = 1,     /* frame.eye is held at the border of the cell, and is covered there */
+  IVIS_POLICY_INCOMPLETE = 2 /* the old PVS is used on; objects may be missing */
 } ivis_policy;
 
 typedef struct ivis_client_options {
-  uint32_t size;            /* of this struct, as ivis_client_options_default() set it */
-  const char* endpoint;     /* tcp://HOST:PORT or ipc://PATH; copied */
-  uint64_t scene_hash;      /* of the scene you have (`ivis info`); 0: take the server's */
-  const char* reach;        /* e.g. "disc:1", at most the server's; NULL: the server's; copied */
+  uint32_t size;        /* of this struct, as ivis_client_options_default() set it */
+  const char* endpoint; /* tcp://HOST:PORT or ipc://PATH; copied */
+  uint64_t scene_hash;  /* of the scene you have (`ivis info`); 0: take the server's */
+  const char* reach;    /* e.g. "disc:1", at most the server's; NULL: the server's; copied */
   ivis_policy policy;
   int32_t connect_timeout_ms; /* 0: return at once, connect behind the scenes */
   int32_t silence_timeout_ms; /* an unanswered server counts as gone after this */
@@ -91,22 +89,23 @@ typedef struct ivis_frame {
   uint32_t sequence;     /* of the pose whose PVS is in use; 0: none yet */
   uint32_t object_count; /* 0 until the server has been met */
   uint32_t visible_count;
-  double cell_eye[3];    /* centre of the view cell of that PVS */
+  double cell_eye[3];           /* centre of the view cell of that PVS */
   const uint64_t* visible_bits; /* bit (id & 63) of word (id >> 6); valid until the next call with
                                    this client, NULL while object_count is 0 */
 } ivis_frame;
 
-/* Sends the pose (a later one overtakes an earlier one that has not left), takes in what has arrived,
- * and says what is visible. Never blocks.
- * Errors: ARGUMENT for an eye that is not finite (nothing is sent, everything is visible); MISMATCH. */
+/* Sends the pose (a later one overtakes an earlier one that has not left), takes in what has
+ * arrived, and says what is visible. Never blocks. Errors: ARGUMENT for an eye that is not finite
+ * (nothing is sent, everything is visible); MISMATCH. */
 IVIS_API ivis_status ivis_client_frame(ivis_client* client, const double eye[3], ivis_frame* out);
 
-/* The two halves of ivis_client_frame(), for a caller with a wait between them. Only the second counts
- * stalls and uncovered frames. */
+/* The two halves of ivis_client_frame(), for a caller with a wait between them. Only the second
+ * counts stalls and uncovered frames. */
 IVIS_API ivis_status ivis_client_pose(ivis_client* client, const double eye[3]);
 IVIS_API ivis_status ivis_client_view(ivis_client* client, const double eye[3], ivis_frame* out);
 
-/* Blocks until the PVS of the latest pose is there, at most timeout_ms. Errors: TIMEOUT, MISMATCH. */
+/* Blocks until the PVS of the latest pose is there, at most timeout_ms. Errors: TIMEOUT, MISMATCH.
+ */
 IVIS_API ivis_status ivis_client_wait(ivis_client* client, int32_t timeout_ms);
 
 /* Can the object be seen? An id that is not known counts as visible. No call, no lock. */
@@ -115,16 +114,16 @@ static inline int ivis_frame_visible(const ivis_frame* frame, uint32_t id) {
 }
 
 typedef struct ivis_stats {
-  uint64_t poses;             /* sent or waiting to be */
-  uint64_t frames;            /* views taken */
-  uint64_t stalls;            /* frames whose eye was held back */
-  uint64_t uncovered_frames;  /* frames without a PVS valid at their eye */
-  uint64_t answers;           /* PVS messages taken in */
-  uint64_t bytes;             /* of all PVS messages, envelopes included; 0 in process */
-  uint64_t reconnects;        /* sessions begun after the first */
-  uint64_t bad_messages;      /* of the server, that could not be used */
-  double last_solve_ms;       /* visibility time of the latest answer, as the server measured it */
-  double last_round_trip_ms;  /* from its pose's sending to its PVS being decoded */
+  uint64_t poses;            /* sent or waiting to be */
+  uint64_t frames;           /* views taken */
+  uint64_t stalls;           /* frames whose eye was held back */
+  uint64_t uncovered_frames; /* frames without a PVS valid at their eye */
+  uint64_t answers;          /* PVS messages taken in */
+  uint64_t bytes;            /* of all PVS messages, envelopes included; 0 in process */
+  uint64_t reconnects;       /* sessions begun after the first */
+  uint64_t bad_messages;     /* of the server, that could not be used */
+  double last_solve_ms;      /* visibility time of the latest answer, as the server measured it */
+  double last_round_trip_ms; /* from its pose's sending to its PVS being decoded */
 } ivis_stats;
 IVIS_API void ivis_client_stats(const ivis_client* client, ivis_stats* out);
 
@@ -132,7 +131,7 @@ IVIS_API void ivis_client_stats(const ivis_client* client, ivis_stats* out);
 typedef struct ivis_info {
   uint64_t scene_hash;
   uint32_t object_count;
-  const char* reach;   /* of every cell, e.g. "cylinder:1.5,0.1" */
+  const char* reach; /* of every cell, e.g. "cylinder:1.5,0.1" */
   const char* method;
 } ivis_info;
 /* Errors: CONNECTION while no server has been met. */
@@ -145,7 +144,8 @@ IVIS_API ivis_status ivis_object_node(const ivis_client* client, uint32_t id, ui
 IVIS_API ivis_status ivis_object_id(const ivis_client* client, uint32_t node, uint32_t instance,
                                     uint32_t* id);
 
-/* What went wrong last, for a person; "" if nothing did. Valid until the next call with this client. */
+/* What went wrong last, for a person; "" if nothing did. Valid until the next call with this
+ * client. */
 IVIS_API const char* ivis_client_error(const ivis_client* client);
 /* Name of a status, never NULL. */
 IVIS_API const char* ivis_status_name(ivis_status status);

@@ -50,7 +50,9 @@ class VisibilityClient {
     status_ = ivis_client_frame(client_.get(), eye, &out);
     return PvsView(out);
   }
-  ivis_status pose(const double (&eye)[3]) { return status_ = ivis_client_pose(client_.get(), eye); }
+  ivis_status pose(const double (&eye)[3]) {
+    return status_ = ivis_client_pose(client_.get(), eye);
+  }
   ivis_status wait(int timeout_ms) { return status_ = ivis_client_wait(client_.get(), timeout_ms); }
   PvsView view(const double (&eye)[3]) {
     ivis_frame out;
@@ -74,7 +76,8 @@ class VisibilityClient {
   }
   std::optional<std::pair<std::uint32_t, std::uint32_t>> node_of(std::uint32_t id) const {
     std::pair<std::uint32_t, std::uint32_t> out;
-    if (ivis_object_node(client_.get(), id, &out.first, &out.second) != IVIS_OK) return std::nullopt;
+    if (ivis_object_node(client_.get(), id, &out.first, &out.second) != IVIS_OK)
+      return std::nullopt;
     return out;
   }
   ivis_status status() const { return status_; }  ///< of the last frame, pose, wait or view
