@@ -18,7 +18,9 @@ struct Args {
   std::size_t rays = 64;
   std::size_t stride = 1;
   std::uint64_t seed = 1;
+  bool strict = false;
   bool json = false;
+  BlockerChoice blockers() const { return strict ? BlockerChoice::kOccluding : BlockerChoice::kDrawn; }
 };
 
 /// Sums up the reports of all cells.
@@ -79,7 +81,7 @@ Outcome verify_path(const Args& args, const Context& context) {
   if (!occluders) return occluders.error();
   const auto method = args.solve.make(*scene, *occluders);
   if (!method) return method.error();
-  const Verifier verifier(*scene, &*occluders);
+  const Verifier verifier(*scene, &*occluders, args.blockers());
   Summary summary;
   for (std::size_t row = 0; row < path->size(); row += args.stride) {
     const auto pvs = (*method)->solve({(*path)[row].eye, *reach});
@@ -101,9 +103,13 @@ Outcome verify_record(const Args& args, const Context& context) {
   if (scene->hash != record->scene_hash)
     return mismatch("'" + args.record.string() + "' was recorded with scene " + hex(record->scene_hash) + ", '" +
                     args.scene.file.string() + "' is " + hex(scene->hash));
+  if (scene->objects.size() != record->objects)
+    return input_error("'" + args.record.string() + "' is of " + std::to_string(record->objects) + " objects, the scene has " +
+                       std::to_string(scene->objects.size()));
+  if (record->frames.empty()) return input_error("'" + args.record.string() + "' holds no frame, so there is nothing to verify");
   const auto occluders = args.solve.get_occluders(*scene, record->reach, context);
   if (!occluders) return occluders.error();
-  const Verifier verifier(*scene, &*occluders);
+  const Verifier verifier(*scene, &*occluders, args.blockers());
   Summary summary;
   for (std::size_t row = 0; row < record->frames.size(); row += args.stride) {
     const client::RecordedFrame& frame = record->frames[row];
@@ -134,10 +140,13 @@ void add_verify(CLI::App& app, std::function<Outcome()>& action) {
   args->scene.add_to(*sub);
   args->solve.add_to(*sub, false);
   auto* path = sub->add_option("--path", args->path, "CSV of poses; needs --reach");
-  sub->add_option("--record", args->record, "what a client was told, recorded by 'ivis walk --record'")->excludes(path);
+  auto* record = sub->add_option("--record", args->record, "what a client was told, recorded by 'ivis walk --record'")->excludes(path);
   sub->add_option("--rays", args->rays, "aimed rays a culled object")->capture_default_str()->check(CLI::Range(1, 1000000));
   sub->add_option("--stride", args->stride, "every K-th pose")->capture_default_str()->check(CLI::Range(1, 1000000000));
-  sub->add_option("--seed", args->seed, "of the rays")->capture_default_str();
+  sub->add_option("--seed", args->seed, "of the rays")->capture_default_str()->check(CLI::NonNegativeNumber);
+  sub->add_flag("--strict", args->strict,
+                "rays pass nodes marked as never an occluder; for methods that take their occluders from the others this finds more")
+      ->excludes(record);
   sub->add_flag("--json", args->json, "print JSON");
   sub->callback([&action, args] {
     if (args->path.empty() && args->record.empty()) throw CLI::RequiredError("--path or --record");
