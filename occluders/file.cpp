@@ -8,6 +8,7 @@
 #include <xxhash.h>
 
 #include "core/path.h"
+#include "core/view_cell.h"
 
 namespace ivis {
 namespace {
@@ -85,6 +86,8 @@ class Reader {
   double f64(const char* field) {
     const double v = std::bit_cast<double>(integer(8, field));
     if (!std::isfinite(v)) fail(field, "a number that is not finite", "a finite one");
+    // Beyond any scene; what is in range stays so in single precision, and so do its products.
+    if (std::abs(v) > 1e9) fail(field, std::to_string(v), "at most 1e9");
     return failed() ? 0 : v;
   }
   Vec3 vec(const char* field) {
@@ -289,7 +292,8 @@ Status check_occluders(const OccluderSet& set, SceneHash scene_hash, const Reach
   if (set.scene_hash != scene_hash)
     return mismatch(name + ": made for the scene with hash " + hex(set.scene_hash) +
                     ", this scene's is " + hex(scene_hash));
-  if (!set.reach.contains(reach))
+  // As a solve asks it: both with their tolerances.
+  if (!padded(set.reach, set.slack_m).contains(padded(reach, set.slack_m)))
     return mismatch(name + ": shrunk for the reach " + set.reach.to_string() +
                     ", which does not contain " + reach.to_string());
   return ok();

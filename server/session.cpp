@@ -8,6 +8,8 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+#include "core/view_cell.h"
+
 namespace ivis::server {
 namespace {
 
@@ -91,7 +93,8 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
   if (!hello.reach.empty()) {
     const auto wanted = Reach::parse(hello.reach);
     if (!wanted) return turn_away(wire::Refusal::kReach, wanted.error().message);
-    if (!reach_.contains(*wanted))
+    constexpr double kSlackM = 0.001;  // a solve compares both with their tolerances
+    if (!padded(reach_, kSlackM).contains(padded(*wanted, kSlackM)))
       return turn_away(wire::Refusal::kReach, "the client wants " + wanted->to_string() +
                                                   ", the server's occluders serve up to " +
                                                   reach_.to_string());

@@ -84,7 +84,7 @@ void OrthographicMap::draw(const WallSet& walls, const WallSet::Solid& solid, co
     };
     std::uint32_t start = 0;
     while (start < ring.count && wanted(start)) ++start;
-    if (start == ring.count) continue;
+    if (start == ring.count) start = 0;  // a court about the eye: cut anywhere
     for (std::uint32_t i = 0; i < ring.count; ++i) {
       const std::uint32_t e = away ? start + i : start + ring.count - i;
       const Vec2 a = away ? corner(e) : corner(e + 1);

@@ -357,7 +357,7 @@ class WallPainter {
     const auto next = [&](std::uint32_t e) { return away ? (e + 1 == n ? 0 : e + 1) : (e == 0 ? n - 1 : e - 1); };
     std::uint32_t e = 0;
     while (e < n && wanted(e)) ++e;
-    if (e == n) return;  // no edge that ends a run: the eye is inside, or the ring is degenerate
+    if (e == n) e = 0;  // all of them, as of a court about the eye: one turn, cut anywhere
     for (std::uint32_t done = 0; done < n; ++done, e = next(e)) {
       if (!wanted(e)) {
         finish_chain(height);

@@ -19,8 +19,15 @@ SolidIndex::SolidIndex(const OccluderSet& occluders) : occluders_(&occluders) {
   const Vec3 size = bounds_.size();
   const double cells = std::clamp(static_cast<double>(boxes.size()), 1.0, 1e6);
   cell_m_ = std::max({std::sqrt(size.x * size.z / cells), size.x / 4096, size.z / 4096, 1e-3});
-  columns_ = static_cast<std::size_t>(size.x / cell_m_) + 1;
-  rows_ = static_cast<std::size_t>(size.z / cell_m_) + 1;
+  // Coarser while large boxes would be entered in too many cells: a file may hold many that cover everything.
+  while (true) {
+    columns_ = static_cast<std::size_t>(size.x / cell_m_) + 1;
+    rows_ = static_cast<std::size_t>(size.z / cell_m_) + 1;
+    double entries = 0;
+    for (const Aabb& b : boxes) entries += b.empty() ? 0 : (b.size().x / cell_m_ + 2) * (b.size().z / cell_m_ + 2);
+    if ((columns_ == 1 && rows_ == 1) || entries <= 16.0 * static_cast<double>(boxes.size()) + 4096) break;
+    cell_m_ *= 2;
+  }
   const auto each_cell = [&](const Aabb& b, const auto& visit) {
     if (b.empty()) return;
     for (std::size_t r = cell_of(b.lo.z, bounds_.lo.z); r <= cell_of(b.hi.z, bounds_.lo.z); ++r)
