@@ -59,6 +59,18 @@ Context make_context(bool quiet) {
 }
 
 // Names in a scene need not be UTF-8.
+CLI::Validator number_within(double least, double most) {
+  const auto check = [least, most](const std::string& text) -> std::string {
+    double v = 0;
+    const auto parsed = std::from_chars(text.data(), text.data() + text.size(), v);
+    if (parsed.ec == std::errc{} && parsed.ptr == text.data() + text.size() && v >= least && v <= most) return "";
+    std::ostringstream wrong;
+    wrong << "'" << text << "' is not a number from " << least << " to " << most;
+    return wrong.str();
+  };
+  return CLI::Validator(check, "NUMBER");
+}
+
 void print(const Json& json) { std::cout << json.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n'; }
 
 std::string hex(SceneHash hash) {
@@ -136,7 +148,7 @@ void SolveArgs::add_to(CLI::App& app, bool reach_required) {
   app.add_option("--map", map, "sampling of the cull map")->capture_default_str()->check(CLI::IsMember({"polar", "orthographic"}));
   app.add_option("--occluders", occluders, "shrunk occluders, made by 'ivis shrink' (default: shrink now)")->type_name("F.ivo");
   app.add_option("--threads", threads, "threads of one solve; the result does not depend on it")->capture_default_str()->check(CLI::Range(1, 256));
-  app.add_option("--max-occluders", max_occluders, "draw only the N occluders of largest projected area; 0: all that show")->capture_default_str();
+  app.add_option("--max-occluders", max_occluders, "draw only the N occluders of largest projected area; 0: all that show")->capture_default_str()->check(CLI::NonNegativeNumber);
   app.add_option("--reference-rays", rays, "aimed rays an object of the method 'reference'")->capture_default_str()->check(CLI::Range(1, 1000000));
 }
 

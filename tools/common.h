@@ -24,6 +24,9 @@ using Json = nlohmann::ordered_json;
 
 enum Exit { kOk = 0, kCheckFailed = 1, kUsage = 2, kBadInput = 3, kNoConnection = 4, kInterrupted = 130 };
 
+/// Accepts numbers from `least` to `most`; CLI::Range lets what is not a number pass.
+CLI::Validator number_within(double least, double most);
+
 /// What a subcommand's action ends with: an exit code, or an error that is printed and mapped to one.
 using Outcome = Result<int>;
 

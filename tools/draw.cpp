@@ -155,7 +155,7 @@ void add_draw(CLI::App& app, std::function<Outcome()>& action) {
   args->solve.add_to(*sub, true);
   sub->add_option("--eye", args->eye, "the observer's eye")->required()->type_name("X,Y,Z");
   sub->add_option("-o,--output", args->out, "picture to write")->required()->type_name("OUT.svg");
-  sub->add_option("--radius", args->radius, "metres shown each way from the eye")->capture_default_str()->check(CLI::Range(1.0, 100000.0));
+  sub->add_option("--radius", args->radius, "metres shown each way from the eye")->capture_default_str()->check(number_within(1, 100000));
   sub->callback([&action, args] { action = [args] { return run(*args); }; });
 }
 

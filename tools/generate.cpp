@@ -35,7 +35,7 @@ Outcome write(const Output& out, const Result<GeneratedScene>& made) {
 
 void add_path_options(CLI::App& app, StreetPathOptions& path) {
   app.add_option("--poses", path.poses, "poses of the walk")->capture_default_str()->check(CLI::Range(2, 1000000));
-  app.add_option("--step", path.step_m, "metres between poses")->capture_default_str()->check(CLI::Range(0.01, 100.0));
+  app.add_option("--step", path.step_m, "metres between poses")->capture_default_str()->check(number_within(0.01, 100));
 }
 
 struct CityArgs {
@@ -57,11 +57,11 @@ void add_generate(CLI::App& app, std::function<Outcome()>& action) {
   auto city = std::make_shared<CityArgs>();
   CLI::App* c = sub->add_subcommand("city", "streets, blocks, courts, houses with windows as geometry, trees, cars, ground");
   city->out.add_to(*c);
-  c->add_option("--seed", city->options.seed, "of everything")->capture_default_str();
+  c->add_option("--seed", city->options.seed, "of everything")->capture_default_str()->check(CLI::NonNegativeNumber);
   c->add_option("--size", city->options.size_m, "side of the square, metres")->capture_default_str();
-  c->add_option("--buildings", city->options.buildings, "aimed at")->capture_default_str();
-  c->add_option("--objects", city->options.objects, "aimed at")->capture_default_str();
-  c->add_option("--triangles", city->options.triangles, "aimed at")->capture_default_str();
+  c->add_option("--buildings", city->options.buildings, "aimed at")->capture_default_str()->check(CLI::NonNegativeNumber);
+  c->add_option("--objects", city->options.objects, "aimed at")->capture_default_str()->check(CLI::NonNegativeNumber);
+  c->add_option("--triangles", city->options.triangles, "aimed at")->capture_default_str()->check(CLI::NonNegativeNumber);
   c->add_option("--relief", city->options.relief_m, "height of the ground's swells, metres")->capture_default_str();
   add_path_options(*c, city->options.path);
   c->callback([&action, city] {
@@ -72,8 +72,8 @@ void add_generate(CLI::App& app, std::function<Outcome()>& action) {
   CLI::App* d = sub->add_subcommand("dress", "real buildings -> the same with ground, windows, trees, lamps, and a walk");
   dress->scene.add_to(*d);
   dress->out.add_to(*d);
-  d->add_option("--seed", dress->options.seed, "of everything")->capture_default_str();
-  d->add_option("--max-triangles", dress->options.max_triangles, "budget, the buildings included")->capture_default_str();
+  d->add_option("--seed", dress->options.seed, "of everything")->capture_default_str()->check(CLI::NonNegativeNumber);
+  d->add_option("--max-triangles", dress->options.max_triangles, "budget, the buildings included")->capture_default_str()->check(CLI::NonNegativeNumber);
   add_path_options(*d, dress->options.path);
   d->callback([&action, dress] {
     action = [dress]() -> Outcome {

@@ -1,3 +1,4 @@
+#include <cstdio>
 #include <exception>
 #include <functional>
 #include <iostream>
@@ -18,7 +19,7 @@ int main(int argc, char** argv) {
       "Exit codes: 0 done, 1 a check failed, 2 usage, 3 input, 4 connection.",
       "ivis"};
   app.set_version_flag("--version", IVIS_VERSION);
-  app.require_subcommand(1);
+  app.require_subcommand(0, 1);  // none is refused below, where a misspelt one has been named
   std::function<Outcome()> action;
   add_info(app, action);
   add_objects(app, action);
@@ -30,12 +31,19 @@ int main(int argc, char** argv) {
   add_generate(app, action);
   try {
     app.parse(argc, argv);
+    if (!action) throw CLI::RequiredError("A subcommand");
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kOk : kUsage;
   }
   try {
     const Outcome outcome = action();
-    if (outcome) return *outcome;
+    // A script that reads half an answer must know.
+    const bool written = (std::cout << std::flush).good() && std::fflush(stdout) == 0;
+    if (outcome && written) return *outcome;
+    if (outcome) {
+      std::cerr << "ivis: cannot write to standard output\n";
+      return kBadInput;
+    }
     std::cerr << "ivis: " << outcome.error().message << '\n';
     return exit_code(outcome.error());
   } catch (const std::bad_alloc&) {

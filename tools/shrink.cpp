@@ -68,7 +68,7 @@ void add_shrink(CLI::App& app, std::function<Outcome()>& action) {
   sub->add_option("--reach", args->reach, "ball:r | disc:r | cylinder:r,h | ellipsoid:a,b,c | box:a,b,c, metres")->required()->type_name("R");
   sub->add_option("-o,--output", args->out, "occluder file to write")->required()->type_name("F.ivo");
   sub->add_option("--builder", args->builder, "fast: edge capsules; exact: CGAL Minkowski sums, slow")->capture_default_str()->check(CLI::IsMember({"fast", "exact"}));
-  sub->add_option("--threads", args->threads, "0: as many as the machine has")->capture_default_str();
+  sub->add_option("--threads", args->threads, "0: as many as the machine has")->capture_default_str()->check(CLI::Range(0, 256));
   sub->add_flag("--json", args->json, "print JSON");
   sub->callback([&action, args] { action = [args] { return run(*args); }; });
 }

@@ -69,7 +69,7 @@ void add_walk(CLI::App& app, std::function<Outcome()>& action) {
   sub->add_option("--path", args->path, "CSV of poses: columns x,y,z by name")->required();
   sub->add_option("--policy", args->policy, "outside the cell of the last PVS: stall there, or draw incomplete")->capture_default_str()->check(CLI::IsMember({"stall", "incomplete"}));
   sub->add_option("--reach", args->reach, "ask for a smaller reach than the server's")->type_name("R");
-  sub->add_option("--hz", args->hz, "poses a second; 0: as fast as answers come, each pose waits for its own")->capture_default_str()->check(CLI::Range(0.0, 10000.0));
+  sub->add_option("--hz", args->hz, "poses a second; 0: as fast as answers come, each pose waits for its own")->capture_default_str()->check(number_within(0, 1000));
   sub->add_option("--record", args->record, "write what the client was told, for 'ivis verify --record'");
   sub->add_flag("--json", args->json, "print JSON");
   sub->callback([&action, args] { action = [args] { return run(*args); }; });

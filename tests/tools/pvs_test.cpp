@@ -1,0 +1,107 @@
+// `ivis pvs`.
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "tests/tools/small_town.h"
+
+namespace ivis::test {
+namespace {
+
+using Keys = std::vector<std::string>;
+using Ids = std::vector<unsigned>;
+
+constexpr const char* kReach = "cylinder:1.5,0.1";
+
+Ids pvs_ids(const SmallTown& town, const std::string& eye,
+            const std::vector<std::string>& more = {}) {
+  std::vector<std::string> arguments{"pvs", town.scene, "--eye", eye, "--reach", kReach, "--json"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  const Ran ran = ivis(arguments);
+  EXPECT_EQ(ran.code, 0) << ran.errors;
+  return ran.code == 0 ? ran.json()["objects"].get<Ids>() : Ids{};
+}
+
+TEST(ToolPvs, PrintsTheFixedKeys) {
+  const SmallTown town;
+  const Ran ran = ivis({"pvs", town.scene, "--eye", SmallTown::kEye, "--reach", kReach, "--json"});
+  ASSERT_EQ(ran.code, 0) << ran.errors;
+  const Json j = ran.json();
+  EXPECT_EQ(keys(j),
+            (Keys{"method", "guarantee", "objects", "count", "total", "compute_ms", "wall_ms"}));
+  EXPECT_EQ(j["guarantee"], "conservative");
+  EXPECT_EQ(j["total"], SmallTown::kObjects);
+  EXPECT_EQ(j["count"], j["objects"].size());
+  const Ids ids = j["objects"].get<Ids>();
+  EXPECT_TRUE(std::is_sorted(ids.begin(), ids.end()));
+  EXPECT_LT(ids.size(), SmallTown::kObjects);
+  EXPECT_GT(ids.size(), SmallTown::kBoxes / 10);
+}
+
+TEST(ToolPvs, EachMethodAndMapAnswers) {
+  const SmallTown town;
+  for (const std::vector<std::string>& more : {std::vector<std::string>{"--map", "polar"},
+                                               {"--map", "orthographic"},
+                                               {"--method", "reference"},
+                                               {"--max-occluders", "3"}}) {
+    EXPECT_FALSE(pvs_ids(town, SmallTown::kEye, more).empty());
+  }
+}
+
+TEST(ToolPvs, ThreadsChangeNothing) {
+  const SmallTown town;
+  const Ids one = pvs_ids(town, SmallTown::kEye);
+  for (const char* n : {"2", "5"})
+    EXPECT_EQ(pvs_ids(town, SmallTown::kEye, {"--threads", n}), one);
+}
+
+TEST(ToolPvs, AnOccluderFileAnswersAsShrinkingOnTheFly) {
+  const SmallTown town;
+  const std::string file = town.folder / "town.ivo";
+  ASSERT_EQ(ivis({"shrink", town.scene, "--reach", kReach, "-o", file}).code, 0);
+  for (const char* eye : {"10,1.7,28", "35,1.7,60", "120,40,28", "-20,1.7,-20"})
+    EXPECT_EQ(pvs_ids(town, eye, {"--occluders", file}), pvs_ids(town, eye));
+}
+
+TEST(ToolPvs, AnEyeInsideAHouseSeesEverythingAndSaysSo) {
+  const SmallTown town;
+  const Json j =
+      ivis({"pvs", town.scene, "--eye", "10,1.7,10", "--reach", kReach, "--json"}).json();
+  EXPECT_EQ(j["count"], SmallTown::kObjects);
+  EXPECT_EQ(j["everything_because"], "eye inside an occluder");
+}
+
+TEST(ToolPvs, APathDumpsWhatEachEyeGives) {
+  const SmallTown town;
+  const std::string dump = town.folder / "dump";
+  std::filesystem::create_directory(dump);
+  write(dump + "/00000.txt", "from an earlier run\n");
+  const Ran ran =
+      ivis({"pvs", town.scene, "--path", town.path, "--reach", kReach, "--json", "--dump", dump});
+  ASSERT_EQ(ran.code, 0) << ran.errors;
+  const Json j = ran.json();
+  EXPECT_EQ(keys(j), (Keys{"poses", "count_median", "compute_ms_median", "compute_ms_p99",
+                           "wall_ms_median"}));
+  ASSERT_EQ(j["poses"].size(), SmallTown::kPoses);
+  std::vector<double> counts;
+  for (std::size_t row = 0; row < SmallTown::kPoses; ++row) {
+    const Json& pose = j["poses"][row];
+    EXPECT_EQ(keys(pose), (Keys{"eye", "count", "compute_ms"}));
+    EXPECT_EQ(pose["eye"], Json::array({10.0 + 25.0 * static_cast<double>(row), 1.7, 28.0}));
+    counts.push_back(pose["count"]);
+    std::string expected;
+    for (const unsigned id : pvs_ids(town, std::to_string(10 + 25 * row) + ",1.7,28"))
+      expected += std::to_string(id) + '\n';
+    EXPECT_EQ(read(dump + "/0000" + std::to_string(row) + ".txt"), expected);
+  }
+  std::sort(counts.begin(), counts.end());
+  EXPECT_EQ(j["count_median"], counts[SmallTown::kPoses / 2]);
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(dump))
+    files += entry.is_regular_file() ? 1 : 0;
+  EXPECT_EQ(files, SmallTown::kPoses) << "nothing half-written is left";
+}
+
+}  // namespace
+}  // namespace ivis::test
