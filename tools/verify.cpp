@@ -104,6 +104,10 @@ Outcome verify_record(const Args& args, const Context& context) {
   if (scene->hash != record->scene_hash)
     return mismatch("'" + args.record.string() + "' was recorded with scene " + hex(record->scene_hash) + ", '" +
                     args.scene.file.string() + "' is " + hex(scene->hash));
+  if (scene->objects.size() != record->objects)
+    return input_error("'" + args.record.string() + "' is of " + std::to_string(record->objects) + " objects, the scene has " +
+                       std::to_string(scene->objects.size()));
+  if (record->frames.empty()) return input_error("'" + args.record.string() + "' holds no frame, so there is nothing to verify");
   const auto occluders = args.solve.get_occluders(*scene, record->reach, context);
   if (!occluders) return occluders.error();
   const Verifier verifier(*scene, &*occluders, blockers(args));
@@ -141,7 +145,7 @@ void add_verify(CLI::App& app, std::function<Outcome()>& action) {
   sub->add_option("--rays", args->rays, "aimed rays a culled object")->capture_default_str()->check(CLI::Range(1, 1000000));
   sub->add_option("--stride", args->stride, "every K-th pose")->capture_default_str()->check(CLI::Range(1, 1000000000));
   sub->add_flag("--strict", args->strict, "see through nodes tagged 'never', which no method takes as occluders: finds more, proves more");
-  sub->add_option("--seed", args->seed, "of the rays")->capture_default_str();
+  sub->add_option("--seed", args->seed, "of the rays")->capture_default_str()->check(CLI::NonNegativeNumber);
   sub->add_flag("--json", args->json, "print JSON");
   sub->callback([&action, args] {
     if (args->path.empty() && args->record.empty()) throw CLI::RequiredError("--path or --record");

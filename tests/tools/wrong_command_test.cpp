@@ -74,7 +74,7 @@ TEST(ToolRefuses, UsageErrorsWithCodeTwo) {
   expect_refused({"generate", "city", "-o", t.folder / "f", "--buildings", "18446744073709551615"},
                  2, "18446744073709551615");
   expect_refused(
-      {"draw", t.scene, "--eye", eye, "--reach", "disc:1", "-o", t.folder / "f", "--radius", "nan"},
+      {"draw", t.scene, "--eye", eye, "--reach", "disc:1", "-o", t.folder / "f.svg", "--radius", "nan"},
       2, "--radius");
   expect_refused({"walk", "--connect", "ipc://x", "--path", t.path, "--policy", "wait"}, 2, "wait");
   expect_refused({"walk", "--connect", "carrier-pigeon", "--path", t.path}, 2, "carrier-pigeon");
@@ -130,13 +130,13 @@ TEST(ToolRefuses, OccludersOfAnotherSceneOrASmallerReach) {
 
 TEST(ToolRefuses, OutputsThatCannotBeWrittenLeavingNothingBehind) {
   const SmallTown t;
-  const std::string nowhere = t.folder / "missing/f";
+  const std::string nowhere = t.folder / "missing/f.svg";
   const std::string taken = t.folder / "taken";
   write(taken, "not a folder");
-  std::filesystem::create_directory(t.folder / "full");
-  write(t.folder / "full/file", "");
+  std::filesystem::create_directory(t.folder / "full.svg");
+  write(t.folder / "full.svg/file", "");
   const auto before = t.folder.files();
-  for (const std::string& bad : {nowhere, t.folder / "full"}) {
+  for (const std::string& bad : {nowhere, t.folder / "full.svg"}) {
     expect_refused({"shrink", t.scene, "--reach", "disc:1", "-o", bad}, 3, bad);
     expect_refused({"draw", t.scene, "--eye", SmallTown::kEye, "--reach", "disc:1", "-o", bad}, 3,
                    bad);
