@@ -15,7 +15,7 @@ namespace {
 
 // The layout is documented in FORMAT.md.
 constexpr std::string_view kMagic = "ivis.ivo";
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kHeaderBytes = 32;
 constexpr std::size_t kChecksumAt = 24;
 constexpr std::size_t kMaxFileBytes = std::size_t{4} << 30U;
@@ -23,6 +23,9 @@ constexpr std::size_t kCornerBytes = 16;
 constexpr std::size_t kMinRingBytes = 4 + 3 * kCornerBytes;
 constexpr std::size_t kMinPrismBytes = 3 * 8 + 1 + 4 + kMinRingBytes;
 constexpr double kMaxReachM = 1e6;
+constexpr std::size_t kPointBytes = 24;
+constexpr std::size_t kFaceBytes = 16;
+constexpr std::size_t kMaxLevels = 64;
 
 /// Of everything but the checksum's own eight bytes.
 std::uint64_t checksum(const char* file, std::size_t size) {
@@ -60,6 +63,34 @@ class Writer {
         }
       }
     }
+  }
+  void mesh(const FaceMesh& m) {
+    u32(m.points.size());
+    for (const Vec3& p : m.points)
+      vec(p);
+    u32(m.faces.size());
+    for (const auto& face : m.faces)
+      for (const std::uint32_t c : face)
+        u32(c);
+  }
+  void numbers(const std::vector<double>& list) {
+    u32(list.size());
+    for (const double v : list)
+      f64(v);
+  }
+  void box(const Aabb& b) {
+    vec(b.lo);
+    vec(b.hi);
+  }
+  void height_field(const HeightField& field) {
+    u32(field.columns);
+    u32(field.rows);
+    f64(field.origin.x);
+    f64(field.origin.y);
+    f64(field.step.x);
+    f64(field.step.y);
+    for (const float h : field.heights)
+      u32(std::bit_cast<std::uint32_t>(h));
   }
   std::string take() { return std::move(bytes_); }
 
@@ -125,6 +156,90 @@ class Reader {
       if (failed()) return {};
     }
     return list;
+  }
+  FaceMesh mesh() {
+    FaceMesh m;
+    m.points.resize(count("points of a mesh", 4, 0, kPointBytes));
+    for (Vec3& p : m.points)
+      p = vec("point of a mesh");
+    m.faces.resize(count("faces of a mesh", 4, 0, kFaceBytes));
+    for (auto& face : m.faces)
+      for (std::uint32_t& c : face) {
+        c = static_cast<std::uint32_t>(integer(4, "corner of a face"));
+        if (c >= m.points.size() && !failed())
+          fail("corner of a face", std::to_string(c),
+               "less than " + std::to_string(m.points.size()));
+      }
+    if (failed()) return {};
+    return m;
+  }
+  std::vector<FaceMesh> meshes(std::size_t most) {
+    std::vector<FaceMesh> list(levels(most));
+    for (FaceMesh& m : list) {
+      m = mesh();
+      if (failed()) return {};
+    }
+    return list;
+  }
+  /// A number of levels, at most `most`.
+  std::size_t levels(std::size_t most) {
+    const std::size_t n = count("levels", 4, 0, 8);
+    if (n > most) fail("levels", std::to_string(n), "at most " + std::to_string(most));
+    return failed() ? 0 : n;
+  }
+  /// Ascending, at least 0.
+  std::vector<double> ladder(const char* field) {
+    std::vector<double> list(count(field, 4, 0, 8));
+    if (list.size() > kMaxLevels)
+      fail(field, std::to_string(list.size()) + " numbers",
+           "at most " + std::to_string(kMaxLevels));
+    double last = 0;
+    for (double& v : list) {
+      v = f64(field);
+      if (v < last) fail(field, std::to_string(v), "at least " + std::to_string(last));
+      last = v;
+      if (failed()) return {};
+    }
+    return list;
+  }
+  Aabb box(const char* field) {
+    const Vec3 lo = vec(field);
+    const Aabb b{lo, vec(field)};
+    if (b.empty()) fail(field, "an empty box", "lo at most hi");
+    return b;
+  }
+  /// Unit to within rounding.
+  Vec3 normal(const char* field) {
+    const Vec3 n = vec(field);
+    const double length = glm::length(n);
+    if (!(std::abs(length - 1) < 1e-9)) fail(field, "length " + std::to_string(length), "1");
+    return n;
+  }
+  HeightField height_field() {
+    HeightField field;
+    field.columns = static_cast<std::uint32_t>(integer(4, "columns"));
+    field.rows = static_cast<std::uint32_t>(integer(4, "rows"));
+    field.origin.x = f64("origin x");
+    field.origin.y = f64("origin z");
+    field.step.x = f64("step x");
+    field.step.y = f64("step z");
+    const std::uint64_t cells = std::uint64_t{field.columns} * field.rows;
+    if (cells > (size_ - at_) / 4)
+      fail("cells of the height field", std::to_string(cells),
+           "at most " + std::to_string((size_ - at_) / 4) + " in the bytes left");
+    if (cells > 0 && !(field.step.x > 0 && field.step.y > 0))
+      fail("step of the height field", std::to_string(std::min(field.step.x, field.step.y)),
+           "more than 0");
+    if (failed()) return {};
+    field.heights.resize(static_cast<std::size_t>(cells));
+    for (float& h : field.heights) {
+      h = std::bit_cast<float>(static_cast<std::uint32_t>(integer(4, "height")));
+      if (!std::isfinite(h) || std::abs(h) > 1e9F) {
+        fail("height", std::to_string(h), "finite, at most 1e9");
+        return {};
+      }
+    }
+    return field;
   }
   void end() {
     if (at_ != size_) fail("end", std::to_string(size_ - at_) + " bytes more", "none");
@@ -216,6 +331,42 @@ std::string encode_occluders(const OccluderSet& set) {
     out.vec(s);
   out.prisms(set.shrunk);
   out.prisms(set.solids);
+  out.numbers(set.margins_m);
+  out.u64(set.prism_pieces.size());
+  for (const PrismPiece& piece : set.prism_pieces) {
+    out.u32(piece.levels.size());
+    for (const auto& level : piece.levels)
+      out.prisms(level);
+  }
+  out.u64(set.solid_pieces.size());
+  for (const SolidPiece& piece : set.solid_pieces) {
+    out.u32(piece.levels.size());
+    for (const FaceMesh& level : piece.levels)
+      out.mesh(level);
+  }
+  out.numbers(set.sheet_radii_m);
+  out.u64(set.sheets.size());
+  for (const Sheet& sheet : set.sheets) {
+    out.vec(sheet.normal);
+    out.f64(sheet.offset);
+    out.u32(sheet.levels.size());
+    for (const FaceMesh& level : sheet.levels)
+      out.mesh(level);
+  }
+  out.height_field(set.height_field);
+  out.u64(set.convex_solids.size());
+  for (const ConvexSolid& solid : set.convex_solids) {
+    out.box(solid.bounds);
+    out.u32(solid.planes.size());
+    for (const ConvexSolid::Plane& plane : solid.planes) {
+      out.vec(plane.normal);
+      out.f64(plane.offset);
+    }
+  }
+  out.u64(set.closed_boxes.size());
+  for (const Aabb& b : set.closed_boxes)
+    out.box(b);
+  out.u8(set.sealed ? 1 : 0);
   const std::string body = out.take();
 
   Writer header;
@@ -272,6 +423,44 @@ Result<OccluderSet> decode_occluders(std::span<const std::byte> bytes, const std
     s = in.vec("view space seed");
   set.shrunk = in.prisms("shrunk prisms");
   set.solids = in.prisms("solids");
+  set.margins_m = in.ladder("margins");
+  set.prism_pieces.resize(in.count("prism pieces", 8, 0, 4));
+  for (PrismPiece& piece : set.prism_pieces) {
+    piece.levels.resize(in.levels(set.margins_m.size()));
+    for (auto& level : piece.levels)
+      level = in.prisms("prisms of a piece");
+    if (in.failed()) break;
+  }
+  set.solid_pieces.resize(in.count("solid pieces", 8, 0, 4));
+  for (SolidPiece& piece : set.solid_pieces) {
+    piece.levels = in.meshes(set.margins_m.size());
+    if (in.failed()) break;
+  }
+  set.sheet_radii_m = in.ladder("sheet radii");
+  set.sheets.resize(in.count("sheets", 8, 0, kPointBytes + 8 + 4));
+  for (Sheet& sheet : set.sheets) {
+    sheet.normal = in.normal("normal of a sheet");
+    sheet.offset = in.f64("offset of a sheet");
+    sheet.levels = in.meshes(set.sheet_radii_m.size());
+    if (in.failed()) break;
+  }
+  set.height_field = in.height_field();
+  set.convex_solids.resize(in.count("convex solids", 8, 0, 2 * kPointBytes + 4));
+  for (ConvexSolid& solid : set.convex_solids) {
+    solid.bounds = in.box("box of a convex solid");
+    solid.planes.resize(in.count("planes of a convex solid", 4, 4, kPointBytes + 8));
+    for (ConvexSolid::Plane& plane : solid.planes) {
+      plane.normal = in.normal("normal of a plane");
+      plane.offset = in.f64("offset of a plane");
+    }
+    if (in.failed()) break;
+  }
+  set.closed_boxes.resize(in.count("closed boxes", 8, 0, 2 * kPointBytes));
+  for (Aabb& b : set.closed_boxes) {
+    b = in.box("closed box");
+    if (in.failed()) break;
+  }
+  set.sealed = in.u8("sealed", 1) != 0;
   if (!in.failed()) in.end();
   if (in.failed()) return input_error(in.error());
   return set;

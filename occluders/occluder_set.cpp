@@ -22,7 +22,8 @@ bool contains(const Polygon& polygon, const Vec2& p) {
     for (std::size_t i = 0, n = ring.size(); i < n; ++i) {
       const Vec2& a = ring[i];
       const Vec2& b = ring[(i + 1) % n];
-      if ((a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)) inside = !inside;
+      if ((a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x))
+        inside = !inside;
     }
   return inside;
 }
@@ -37,18 +38,30 @@ Aabb Prism::bounds() const {
   return box;
 }
 
-// A point Z under the prism and within its footprint, on a sight line QY. By the floor rule Q and Y lie
-// no lower than solid_bottom, so Z cannot. By the ground rule Q is above the ground and Z below it, and
-// the segment QZ stays over the rectangle that the ground covers: it crosses drawn, opaque ground.
+// A point Z under the prism and within its footprint, on a sight line QY. By the floor rule Q and Y
+// lie no lower than solid_bottom, so Z cannot. By the ground rule Q is above the ground and Z below
+// it, and the segment QZ stays over the rectangle that the ground covers: it crosses drawn, opaque
+// ground.
 bool extends_down(const OccluderSet& set, const Prism& prism, const Aabb& cell) {
   if (prism.solid_bottom <= set.floor && cell.lo.y >= prism.solid_bottom) return true;
-  return prism.grounded && !set.ground.empty() && cell.lo.x >= set.ground.lo.x && cell.hi.x <= set.ground.hi.x &&
-         cell.lo.z >= set.ground.lo.z && cell.hi.z <= set.ground.hi.z;
+  return prism.grounded && !set.ground.empty() && cell.lo.x >= set.ground.lo.x &&
+         cell.hi.x <= set.ground.hi.x && cell.lo.z >= set.ground.lo.z &&
+         cell.hi.z <= set.ground.hi.z;
+}
+
+bool contains(const ConvexSolid& solid, const Vec3& p) {
+  for (const ConvexSolid::Plane& plane : solid.planes)
+    if (glm::dot(plane.normal, p) >= plane.offset) return false;
+  return !solid.planes.empty();
 }
 
 bool inside_solid(const OccluderSet& set, const Vec3& p) {
   for (const Prism& s : set.solids)
     if (p.y > s.bottom && p.y < s.top && contains(s.footprint, ground(p))) return true;
+  for (const ConvexSolid& s : set.convex_solids)
+    if (s.bounds.contains(p) && contains(s, p)) return true;
+  for (const Aabb& b : set.closed_boxes)
+    if (b.contains(p)) return true;
   return false;
 }
 

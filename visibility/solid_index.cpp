@@ -9,11 +9,11 @@ std::size_t SolidIndex::cell_of(double v, double lo) const { return static_cast<
 
 SolidIndex::SolidIndex(const OccluderSet& occluders) : occluders_(&occluders) {
   std::vector<Aabb> boxes;
-  boxes.reserve(occluders.solids.size());
-  for (const Prism& s : occluders.solids) {
-    boxes.push_back(s.bounds());
-    bounds_.add(boxes.back());
-  }
+  boxes.reserve(occluders.solids.size() + occluders.convex_solids.size() + occluders.closed_boxes.size());
+  for (const Prism& s : occluders.solids) boxes.push_back(s.bounds());
+  for (const ConvexSolid& s : occluders.convex_solids) boxes.push_back(s.bounds);
+  boxes.insert(boxes.end(), occluders.closed_boxes.begin(), occluders.closed_boxes.end());
+  for (const Aabb& b : boxes) bounds_.add(b);
   if (boxes.empty() || bounds_.empty()) return;
   // About one solid a cell; at most a million cells.
   const Vec3 size = bounds_.size();
@@ -45,10 +45,24 @@ bool SolidIndex::holds(const Vec3& p) const {
   if (start_.empty() || !bounds_.contains(p)) return false;
   const std::size_t cell = cell_of(p.z, bounds_.lo.z) * columns_ + cell_of(p.x, bounds_.lo.x);
   for (std::uint32_t i = start_[cell]; i < start_[cell + 1]; ++i) {
-    const Prism& s = occluders_->solids[solids_[i]];
-    if (p.y > s.bottom && p.y < s.top && contains(s.footprint, ground(p))) return true;
+    if (holds(solids_[i], p)) return true;
   }
   return false;
+}
+
+/// Prisms come first, then convex solids, then boxes.
+bool SolidIndex::holds(std::size_t solid, const Vec3& p) const {
+  const std::size_t prisms = occluders_->solids.size();
+  const std::size_t convex = occluders_->convex_solids.size();
+  if (solid < prisms) {
+    const Prism& s = occluders_->solids[solid];
+    return p.y > s.bottom && p.y < s.top && contains(s.footprint, ground(p));
+  }
+  if (solid < prisms + convex) {
+    const ConvexSolid& s = occluders_->convex_solids[solid - prisms];
+    return s.bounds.contains(p) && contains(s, p);
+  }
+  return occluders_->closed_boxes[solid - prisms - convex].contains(p);
 }
 
 }  // namespace ivis

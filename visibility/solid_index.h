@@ -7,7 +7,7 @@
 
 namespace ivis {
 
-/// Finds the unshrunk solid that holds a point. A uniform grid over the ground plane.
+/// Finds whether an unshrunk solid or a closed box holds a point. A uniform grid over the ground plane.
 /// Threads: read-only after construction. Ownership: borrows the occluders.
 /// Cost: O(solids) to build; a query looks at the solids over one grid cell.
 class SolidIndex {
@@ -16,6 +16,7 @@ class SolidIndex {
   bool holds(const Vec3& p) const;
 
  private:
+  bool holds(std::size_t solid, const Vec3& p) const;
   std::size_t cell_of(double v, double lo) const;
 
   const OccluderSet* occluders_;

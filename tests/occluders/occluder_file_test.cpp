@@ -30,6 +30,19 @@ OccluderSet example() {
   const Polygon triangle{{{{0.1, 0.2}, {1.0 / 3, 0}, {1, 1}}}};
   set.shrunk = {{holed, 0.2, 8.5, 0, true}, {triangle, 0.2, 9, 0, false}};
   set.solids = {{triangle, 0, 9, 0, false}};
+  const FaceMesh tetrahedron{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                             {{0, 2, 1, 1}, {0, 1, 3, 3}, {0, 3, 2, 2}, {1, 2, 3, 3}}};
+  const FaceMesh square{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2, 3}}};
+  set.margins_m = {0.1, 0.25};
+  set.prism_pieces = {{{{{triangle, 0.5, 7, 0, true}}, {}}}};
+  set.solid_pieces = {{{tetrahedron, {}}}, {{tetrahedron}}};
+  set.sheet_radii_m = {0.5};
+  set.sheets = {{{0, 0.6, 0.8}, 3.5, {square}}};
+  set.height_field = {{-1, 2}, {0.5, 0.25}, 2, 3, {1, 2, 3, 4.5F, HeightField::kNone, 6}};
+  set.convex_solids = {
+      {{{{1, 0, 0}, 1}, {{-1, 0, 0}, 0}, {{0, 1, 0}, 2}, {{0, 0, 1}, 3}}, {{0, 0, 0}, {1, 2, 3}}}};
+  set.closed_boxes = {{{0, 1, 2}, {3, 4, 5}}};
+  set.sealed = true;
   return set;
 }
 
@@ -77,6 +90,13 @@ TEST(OccluderFile, RoundTripKeepsEveryBit) {
   EXPECT_TRUE(set->shrunk[0].grounded);
   EXPECT_EQ(set->shrunk[1].top, 9);
   EXPECT_EQ(set->ground.hi, e.ground.hi);
+  EXPECT_EQ(set->margins_m, e.margins_m);
+  EXPECT_EQ(set->solid_pieces[0].levels[0].faces, e.solid_pieces[0].levels[0].faces);
+  EXPECT_EQ(set->sheets[0].levels[0].points, e.sheets[0].levels[0].points);
+  EXPECT_EQ(set->height_field.heights, e.height_field.heights);
+  EXPECT_EQ(set->convex_solids[0].planes[3].offset, 3);
+  EXPECT_EQ(set->closed_boxes[0].hi, e.closed_boxes[0].hi);
+  EXPECT_TRUE(set->sealed);
 }
 
 TEST(OccluderFile, KeepsEveryKindOfReachAndAnEmptyGround) {
@@ -179,13 +199,41 @@ TEST(OccluderFile, RefusesValuesOutOfTheirRange) {
   }
 }
 
+TEST(OccluderFile, RefusesPiecesThatDoNotFitTogether) {
+  const auto refused = [](const char* field, const auto& change) {
+    OccluderSet set = example();
+    change(set);
+    const auto back = decode(encode_occluders(set));
+    ASSERT_FALSE(back) << field;
+    EXPECT_THAT(back.error().message, HasSubstr(field));
+  };
+  refused("margins", [](OccluderSet& s) { s.margins_m = {0.25, 0.1}; });
+  refused("margins", [](OccluderSet& s) { s.margins_m.assign(65, 1); });
+  refused("levels", [](OccluderSet& s) { s.margins_m = {0.1}; });
+  refused("levels", [](OccluderSet& s) { s.sheet_radii_m = {}; });
+  refused("corner of a face", [](OccluderSet& s) { s.solid_pieces[0].levels[0].faces[1][2] = 4; });
+  refused("normal of a sheet", [](OccluderSet& s) { s.sheets[0].normal = {0, 0.6, 0.7}; });
+  refused("normal of a plane", [](OccluderSet& s) {
+    s.convex_solids[0].planes[1].normal = {0, 0, 0};
+  });
+  refused("planes of a convex solid", [](OccluderSet& s) { s.convex_solids[0].planes.resize(3); });
+  refused("box of a convex solid", [](OccluderSet& s) { s.convex_solids[0].bounds.lo.x = 2; });
+  refused("closed box", [](OccluderSet& s) { s.closed_boxes[0].lo.y = 5; });
+  refused("step of the height field", [](OccluderSet& s) { s.height_field.step.y = 0; });
+  refused("cells of the height field",
+          [](OccluderSet& s) { s.height_field.columns = s.height_field.rows = ~0U; });
+  refused("height", [](OccluderSet& s) {
+    s.height_field.heights[2] = std::numeric_limits<float>::infinity();
+  });
+}
+
 TEST(OccluderFile, RefusesAnotherVersionAsAMismatch) {
   std::string bytes = encode_occluders(example());
-  put(bytes, 8, 2, 4);
+  put(bytes, 8, 3, 4);
   const auto set = decode(with_right_checksum(bytes));
   ASSERT_FALSE(set);
   EXPECT_EQ(set.error().code, ErrorCode::kMismatch);
-  EXPECT_THAT(set.error().message, HasSubstr("version 2"));
+  EXPECT_THAT(set.error().message, HasSubstr("version 3"));
 }
 
 TEST(OccluderFile, OnlyServesItsOwnSceneAndReachesItContains) {
