@@ -6,12 +6,12 @@
 
 #include "core/view_cell.h"
 #include "occluders/clip.h"
-#include "occluders/distance_check.h"
 #include "occluders/fuse.h"
+#include "occluders/gate.h"
 #include "occluders/ground.h"
+#include "occluders/prism_ladder.h"
 #include "occluders/prisms.h"
 #include "occluders/progress.h"
-#include "occluders/simplify.h"
 
 namespace ivis {
 namespace {
@@ -60,18 +60,6 @@ struct ShrunkStack {
   std::size_t thin = 0;
 };
 
-/// The piece with fewer corners if that passes the distance check, else as it is if that does.
-std::vector<Polygon> gated(const Polygon& piece, const Polygon& region, const Reach& reach,
-                           std::size_t& failed) {
-  std::vector<Polygon> simple = simplify_inwards(piece);
-  if (std::all_of(simple.begin(), simple.end(),
-                  [&](const Polygon& p) { return within_erosion(p, region, reach); }))
-    return simple;
-  if (within_erosion(piece, region, reach)) return {piece};
-  ++failed;
-  return {};
-}
-
 /// E(region x [bottom, top], W) with W the hull of V' - apex: footprints by V's shadow, tops stay
 /// (less slack), bottoms rise by all that the cell can move up or down.
 ShrunkStack shrink_stack(const FusedStack& stack, const OccluderSet& set, const Reach& grown,
@@ -92,14 +80,12 @@ ShrunkStack shrink_stack(const FusedStack& stack, const OccluderSet& set, const 
       continue;
     }
     for (const Polygon& region : level->region) {
-      std::vector<Polygon> eroded = eroder.erode(region, grown);
-      std::erase_if(eroded, [](const Polygon& p) { return area(p) < kMinAreaM2; });
-      if (eroded.empty()) ++out.thin;
-      for (const Polygon& exact : eroded) {
-        for (Polygon& piece : gated(exact, region, grown, out.failed)) {
-          const double a = area(piece);
-          if (a >= kMinAreaM2) here.push_back({std::move(piece), a});
-        }
+      const std::size_t failed = out.failed;
+      std::vector<Polygon> eroded = gated_erosion(region, grown, eroder, kMinAreaM2, out.failed);
+      if (eroded.empty() && out.failed == failed) ++out.thin;
+      for (Polygon& piece : eroded) {
+        const double a = area(piece);
+        here.push_back({std::move(piece), a});
       }
     }
     std::vector<Piece> standing;
@@ -217,6 +203,12 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
       set.shrunk.push_back(std::move(p));
   }
   report.occluders_out = set.shrunk.size();
+
+  if (options.margins) {
+    set.margins_m = options.margins_m.empty() ? default_margins(options.reach.half_extents().x) : options.margins_m;
+    add_prism_ladder(stacks, grown, eroder, {}, set, context);
+    if (context.stopped()) return cancelled();
+  }
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
 }

@@ -34,6 +34,9 @@ struct ShrinkReport {
 struct ShrinkOptions {
   Reach reach;
   ViewSpace view_space;
+  /// Also make what the occlusion map draws.
+  bool margins = true;
+  std::vector<double> margins_m;  ///< empty: default_margins() of the reach
 };
 
 struct Shrunk {

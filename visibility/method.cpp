@@ -1,6 +1,7 @@
 #include "visibility/method.h"
 
 #include "visibility/cull_map.h"
+#include "visibility/occlusion_map.h"
 #include "visibility/reference.h"
 
 namespace ivis {
@@ -26,6 +27,10 @@ const std::vector<Entry>& entries() {
       {CullMap::make_traits(),
        [](const Scene& s, const OccluderSet& o, const MethodOptions& m) -> std::unique_ptr<Method> {
          return std::make_unique<CullMap>(s, o, m);
+       }},
+      {OcclusionMap::make_traits(),
+       [](const Scene& s, const OccluderSet& o, const MethodOptions& m) -> std::unique_ptr<Method> {
+         return std::make_unique<OcclusionMap>(s, o, m);
        }},
       {reference_traits(), make_reference},
   };

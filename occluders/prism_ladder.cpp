@@ -1,0 +1,109 @@
+#include "occluders/prism_ladder.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <map>
+
+#include "occluders/clip.h"
+#include "occluders/gate.h"
+#include "occluders/progress.h"
+
+namespace ivis {
+namespace {
+
+constexpr double kMinAreaM2 = 0.01;
+
+Aabb bounds_of(const std::vector<Polygon>& region) {
+  Aabb box;
+  for (const Polygon& p : region)
+    for (const auto& ring : p.rings)
+      for (const Vec2& c : ring) box.add(Vec3{c.x, 0, c.y});
+  return box;
+}
+
+/// The polygon's parts within the rectangle.
+std::vector<Polygon> within(const Polygon& polygon, const Vec2& lo, const Vec2& hi) {
+  const Aabb b = bounds_of({polygon});
+  if (b.lo.x >= lo.x && b.hi.x <= hi.x && b.lo.z >= lo.y && b.hi.z <= hi.y) return {polygon};
+  const Vec2 far_lo{std::min(b.lo.x, lo.x) - 1, std::min(b.lo.z, lo.y) - 1};
+  const Vec2 far_hi{std::max(b.hi.x, hi.x) + 1, std::max(b.hi.z, hi.y) + 1};
+  const auto box = [](const Vec2& p, const Vec2& q) { return Ring{p, {q.x, p.y}, q, {p.x, q.y}}; };
+  return subtract(polygon.rings, Fill::kEvenOdd,
+                  {box(far_lo, {lo.x, far_hi.y}), box({hi.x, far_lo.y}, far_hi), box(far_lo, {far_hi.x, lo.y}),
+                   box({far_lo.x, hi.y}, far_hi)});
+}
+
+/// One stack's parts by grid cell.
+std::vector<PrismPiece> pieces_of(const FusedStack& stack, const Reach& padded_reach, const Eroder& eroder, double part_m,
+                                  const OccluderSet& set, std::size_t& failed) {
+  Aabb whole;
+  for (const FusedLevel& level : stack.levels) whole.add(bounds_of(level.region));
+  if (whole.empty()) return {};
+  const Vec3 size = whole.size();
+  const bool cut = std::max(size.x, size.z) > 1.5 * part_m;
+  const auto columns = cut ? std::max(1.0, std::round(size.x / part_m)) : 1;
+  const auto rows = cut ? std::max(1.0, std::round(size.z / part_m)) : 1;
+  const Vec2 step{size.x / columns, size.z / rows};
+  std::map<std::pair<int, int>, PrismPiece> pieces;
+  const bool reaches_down = stack.grounded || stack.bottom <= set.floor;
+  for (std::size_t k = 0; k < set.margins_m.size(); ++k) {
+    const Reach reach = padded_reach.grown(set.margins_m[k], set.margins_m[k]);
+    const double vertical = reach.half_extents().y;
+    for (const FusedLevel& level : stack.levels) {
+      const double top = level.top - vertical;
+      const double raised = stack.bottom + vertical;
+      if (!reaches_down && raised >= top) continue;
+      for (const Polygon& region : level.region)
+        for (const Polygon& eroded : gated_erosion(region, reach, eroder, kMinAreaM2, failed)) {
+          const auto add = [&](int column, int row, Polygon part) {
+            auto& levels = pieces[{row, column}].levels;
+            if (levels.size() <= k) levels.resize(k + 1);
+            levels[k].push_back({std::move(part), std::min(raised, top), top, stack.bottom, stack.grounded});
+          };
+          if (!cut) {
+            add(0, 0, eroded);
+            continue;
+          }
+          const Aabb b = bounds_of({eroded});
+          const auto cell = [](double v, double lo, double s, double n) {
+            return static_cast<int>(std::clamp(std::floor((v - lo) / s), 0.0, n - 1));
+          };
+          for (int r = cell(b.lo.z, whole.lo.z, step.y, rows); r <= cell(b.hi.z, whole.lo.z, step.y, rows); ++r)
+            for (int c = cell(b.lo.x, whole.lo.x, step.x, columns); c <= cell(b.hi.x, whole.lo.x, step.x, columns); ++c) {
+              const Vec2 lo{whole.lo.x + c * step.x, whole.lo.z + r * step.y};
+              for (Polygon& part : within(eroded, lo, lo + step))
+                if (area(part) >= kMinAreaM2) add(c, r, std::move(part));
+            }
+        }
+    }
+  }
+  std::vector<PrismPiece> out;
+  for (auto& [cell, piece] : pieces) out.push_back(std::move(piece));
+  return out;
+}
+
+}  // namespace
+
+std::vector<double> default_margins(double radius_m) {
+  if (radius_m < 0.5) return {0.025, 0.05, 0.1, 0.25, 0.5, 1, 2};
+  return {0.1, 0.25, 0.5, 1, 2, 4};
+}
+
+std::size_t add_prism_ladder(const std::vector<FusedStack>& stacks, const Reach& padded_reach, const Eroder& eroder,
+                             const PrismLadderOptions& options, OccluderSet& set, const Context& context) {
+  std::vector<std::vector<PrismPiece>> found(stacks.size());
+  std::atomic<std::size_t> failed{0};
+  Progress progress(context, "margins", stacks.size());
+  parallel_for(context, stacks.size(), [&](std::size_t i) {
+    std::size_t missed = 0;
+    found[i] = pieces_of(stacks[i], padded_reach, eroder, options.part_m, set, missed);
+    failed += missed;
+    progress.step();
+  });
+  for (auto& list : found)
+    for (PrismPiece& piece : list) set.prism_pieces.push_back(std::move(piece));
+  return failed;
+}
+
+}  // namespace ivis

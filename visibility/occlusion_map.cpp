@@ -1,0 +1,272 @@
+#include "visibility/occlusion_map.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include <tbb/info.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include "visibility/answer.h"
+
+namespace ivis {
+namespace {
+
+/// A pixel's half diagonal at depth w of a map of n pixels a side is sqrt(2) w / n; 1 % more pays for rounding.
+constexpr double kMarginFactor = 1.01 * std::numbers::sqrt2;
+constexpr std::uint32_t kAllSides = 0x3f;
+constexpr std::uint32_t kHorizontalSides = 0x33;  ///< that look along x and z
+
+/// Where 16 bits of depth should be spent: what is nearer than this counts as visible.
+float near_for(const Reach& reach) {
+  const Vec3& e = reach.half_extents();
+  return static_cast<float>(std::clamp(4 * std::max({e.x, e.y, e.z}), 0.25, 4.0));
+}
+
+}  // namespace
+
+/// The cell as the map wants it: relative to the origin, seen from its centre.
+struct OcclusionMap::Cell {
+  Vec3 eye;
+  float single[3];
+  Reach reach;    ///< padded
+  double radius;  ///< of a ball about the eye that holds the cell
+  bool above_floor;
+  bool on_ground;
+};
+
+struct OcclusionMap::Scratch {
+  Scratch(std::uint32_t pixels, float near_m) : cube(pixels, near_m) {}
+  DepthCube cube;
+  /// A child of a node of the pieces' tree that may show.
+  struct Entry {
+    float distance;  ///< squared, of its box
+    std::uint32_t node;
+    std::uint32_t child;
+    bool operator<(const Entry& o) const { return distance != o.distance ? distance > o.distance : node != o.node ? node > o.node : child > o.child; }
+  };
+  std::vector<Entry> queue;
+  std::vector<std::uint32_t> visible;
+  std::vector<std::uint64_t> bits;
+};
+
+OcclusionMap::OcclusionMap(const Scene& scene, const OccluderSet& occluders, const MethodOptions& options, const OcclusionGuards& guards)
+    : scene_(scene),
+      occluders_(occluders),
+      options_(options),
+      guards_(guards),
+      origin_(scene.bounds.empty() ? Vec3{0} : scene.bounds.centre()),
+      near_m_(near_for(occluders.reach)),
+      pieces_(make_pieces(scene, occluders, origin_)),
+      solids_(occluders) {
+  std::vector<Aabb> boxes;
+  std::vector<std::uint32_t> ids;
+  for (ObjectId id = 0; id < scene.objects.size(); ++id) {
+    const Object& o = scene.objects[id];
+    if (o.always_visible) {
+      always_visible_.push_back(id);
+    } else {
+      boxes.push_back(o.bounds);
+      ids.push_back(id);
+    }
+  }
+  objects_ = BoxTree::build(boxes, ids, origin_);
+}
+
+OcclusionMap::~OcclusionMap() = default;
+
+MethodTraits OcclusionMap::make_traits() {
+  return {"occlusion-map", Guarantee::kConservative, true,
+          "depth maps of shrunk occluders of every kind (Wonka, Wimmer, Sillion 2001, section 5.2)"};
+}
+
+const MethodTraits& OcclusionMap::traits() const {
+  static const MethodTraits conservative = make_traits();
+  return conservative;
+}
+
+std::unique_ptr<OcclusionMap::Scratch> OcclusionMap::take_scratch() const {
+  const std::lock_guard lock(scratch_mutex_);
+  if (scratch_.empty()) return std::make_unique<Scratch>(options_.map_pixels, near_m_);
+  auto scratch = std::move(scratch_.back());
+  scratch_.pop_back();
+  return scratch;
+}
+
+void OcclusionMap::give_back(std::unique_ptr<Scratch> scratch) const {
+  const std::lock_guard lock(scratch_mutex_);
+  scratch_.push_back(std::move(scratch));
+}
+
+Result<Pvs> OcclusionMap::solve(const ViewCell& cell) const {
+  Stats stats;
+  return solve(cell, stats);
+}
+
+Result<Pvs> OcclusionMap::solve(const ViewCell& cell, Stats& stats) const {
+  if (auto s = check_cell(cell, occluders_); !s) return s.error();
+  Pvs pvs = empty_answer(scene_, cell);
+  if (auto why = why_everything(cell.eye, origin_, solids_, occluders_.slack_m); !why.empty()) {
+    list_everything(scene_, std::move(why), pvs);
+    return pvs;
+  }
+  Cell c;
+  c.eye = cell.eye - origin_;
+  for (int i = 0; i < 3; ++i) c.single[i] = static_cast<float>(c.eye[i]);
+  c.reach = padded(cell.reach, occluders_.slack_m);
+  const Vec3 half = c.reach.half_extents();
+  c.radius = c.reach.kind() == Reach::Kind::kBox        ? glm::length(half)
+             : c.reach.kind() == Reach::Kind::kCylinder ? std::hypot(std::max(half.x, half.z), half.y)
+                                                        : std::max({half.x, half.y, half.z});
+  const Aabb box{cell.eye - half, cell.eye + half};
+  c.above_floor = box.lo.y >= occluders_.floor;
+  const Aabb& ground = occluders_.ground;
+  c.on_ground = !ground.empty() && box.lo.x >= ground.lo.x && box.hi.x <= ground.hi.x && box.lo.z >= ground.lo.z &&
+                box.hi.z <= ground.hi.z;
+
+  auto scratch = take_scratch();
+  scratch->cube.clear();
+  scratch->visible.clear();
+  draw(c, *scratch, stats);
+  find(c, *scratch, stats);
+  list_ascending(scene_.objects.size(), scratch->visible, always_visible_, scratch->bits, pvs);
+  give_back(std::move(scratch));
+  return pvs;
+}
+
+/// Near pieces first; whole branches that what is drawn hides are passed over, which is always safe.
+void OcclusionMap::draw(const Cell& cell, Scratch& scratch, Stats& stats) const {
+  const BoxTree& tree = pieces_.tree;
+  if (tree.nodes.empty()) return;
+  if (options_.max_occluders > 0 && options_.max_occluders < pieces_.pieces.size()) {
+    for (const std::uint32_t p : largest_pieces(cell)) draw_piece(pieces_.pieces[p], kAllSides, cell, scratch, stats);
+    return;
+  }
+  auto& queue = scratch.queue;
+  queue.clear();
+  std::uint8_t sides[BoxTree::kWidth];
+  const auto open = [&](std::uint32_t index) {
+    const BoxTree::Node& node = tree.nodes[index];
+    find_sides(node, cell.single, scratch.cube, 0xffff, sides);
+    ++stats.nodes_tested;
+    for (std::uint32_t c = 0; c < node.count; ++c) {
+      if (sides[c] == 0) continue;
+      const float dx = std::max({node.lo_x[c] - cell.single[0], cell.single[0] - node.hi_x[c], 0.0F});
+      const float dy = std::max({node.lo_y[c] - cell.single[1], cell.single[1] - node.hi_y[c], 0.0F});
+      const float dz = std::max({node.lo_z[c] - cell.single[2], cell.single[2] - node.hi_z[c], 0.0F});
+      queue.push_back({dx * dx + dy * dy + dz * dz, index, c});
+      std::push_heap(queue.begin(), queue.end());
+    }
+  };
+  open(0);
+  while (!queue.empty()) {
+    std::pop_heap(queue.begin(), queue.end());
+    const Scratch::Entry e = queue.back();
+    queue.pop_back();
+    const BoxTree::Node& node = tree.nodes[e.node];
+    const std::uint32_t child = node.child[e.child];
+    if ((child & BoxTree::kItem) == 0) {
+      open(child);
+      continue;
+    }
+    ++stats.pieces_tested;
+    find_sides(node, cell.single, scratch.cube, 1U << e.child, sides);
+    if (sides[e.child] != 0) draw_piece(pieces_.pieces[child & ~BoxTree::kItem], sides[e.child], cell, scratch, stats);
+  }
+}
+
+/// At the first margin that covers a pixel at the piece's far side; not at all where none does.
+void OcclusionMap::draw_piece(const OccluderPieces::Piece& piece, std::uint32_t sides, const Cell& cell, Scratch& scratch,
+                              Stats& stats) const {
+  double far[3];
+  double across = 0;  // squared distance of the farthest corner
+  for (int i = 0; i < 3; ++i) {
+    far[i] = std::max(std::abs(static_cast<double>(piece.lo[i]) - cell.eye[i]), std::abs(static_cast<double>(piece.hi[i]) - cell.eye[i]));
+    across += far[i] * far[i];
+  }
+  const auto pixels = static_cast<double>(options_.map_pixels);
+  const auto margin_at = [&](double w) { return kMarginFactor * w / pixels; };
+  std::uint32_t level = 0;
+  if (piece.kind == OccluderPieces::Kind::kSheet) {
+    // docs/theory.md, 9: the line of sight through a pixel meets the plane within r of where its centre's ray does, at most
+    // D + r away, so its angle's cosine is at least a / (D + r); r = (R + margin) (D + r) / a, solved for r.
+    const double a = glm::dot(piece.normal, cell.eye) - piece.offset;
+    const double needed = cell.radius + margin_at(std::max({far[0], far[1], far[2]}));
+    if (a <= 1.001 * needed) return;
+    double r = needed * std::sqrt(across) / (a - needed) * (1 + 1e-6);
+    if (!guards_.sheet_obliqueness) r = needed;
+    while (level < piece.levels && pieces_.sheet_radii_m[level] < r) ++level;
+  } else {
+    const double m = margin_at(std::max(far[0], far[2]));
+    if (guards_.pixel_margin)
+      while (level < piece.levels && pieces_.margins_m[level] < m) ++level;
+    // A prism drawn far down may be deeper on the faces that look down than the margin allows.
+    if (level < piece.levels && guards_.pixel_margin && pieces_.margins_m[level] < margin_at(far[1])) sides &= kHorizontalSides;
+  }
+  if (level >= piece.levels || sides == 0) return;
+  std::uint32_t first = piece.first_level;
+  if ((piece.kind == OccluderPieces::Kind::kFloored && !cell.above_floor) ||
+      (piece.kind == OccluderPieces::Kind::kGrounded && !cell.on_ground))
+    first = piece.first_real_level;
+  const OccluderPieces::Level& faces = pieces_.levels[first + level];
+  if (faces.batches == 0) return;
+  ++stats.pieces_drawn;
+  draw_faces(pieces_.faces(faces), cell.single, sides, piece.kind == OccluderPieces::Kind::kSheet, scratch.cube, stats);
+}
+
+/// The options_.max_occluders pieces of largest projected area, near ones first.
+std::vector<std::uint32_t> OcclusionMap::largest_pieces(const Cell& cell) const {
+  struct Candidate {
+    double area;
+    double distance;
+    std::uint32_t piece;
+  };
+  std::vector<Candidate> all;
+  for (std::uint32_t p = 0; p < pieces_.pieces.size(); ++p) {
+    const OccluderPieces::Piece& piece = pieces_.pieces[p];
+    const Vec3 size = Vec3(piece.hi) - Vec3(piece.lo);
+    Vec3 gap{0};
+    for (int i = 0; i < 3; ++i)
+      gap[i] = std::max({static_cast<double>(piece.lo[i]) - cell.eye[i], cell.eye[i] - static_cast<double>(piece.hi[i]), 0.0});
+    const double distance = std::max(glm::length(gap), 0.1);
+    all.push_back({glm::dot(size, size) / (distance * distance), distance, p});
+  }
+  const auto larger = [](const Candidate& a, const Candidate& b) { return a.area != b.area ? a.area > b.area : a.piece < b.piece; };
+  const auto nearer = [](const Candidate& a, const Candidate& b) { return a.distance != b.distance ? a.distance < b.distance : a.piece < b.piece; };
+  const auto end = all.begin() + static_cast<std::ptrdiff_t>(std::min(options_.max_occluders, all.size()));
+  std::nth_element(all.begin(), end, all.end(), larger);
+  std::sort(all.begin(), end, nearer);
+  std::vector<std::uint32_t> chosen;
+  for (auto it = all.begin(); it != end; ++it) chosen.push_back(it->piece);
+  return chosen;
+}
+
+void OcclusionMap::find(const Cell& cell, Scratch& scratch, Stats& stats) const {
+  if (objects_.nodes.empty()) return;
+  if (options_.threads <= 1) {
+    find_visible(objects_, 0, cell.single, scratch.cube, scratch.visible, stats);
+    return;
+  }
+  // The tree's upper levels alone, then each subtree as a task: the same tests as in one thread.
+  std::vector<std::uint32_t> roots{0};
+  while (!roots.empty() && roots.size() < 8U * options_.threads) {
+    std::vector<std::uint32_t> next;
+    for (const std::uint32_t r : roots) find_visible_children(objects_, r, cell.single, scratch.cube, scratch.visible, next, stats);
+    roots = std::move(next);
+  }
+  std::vector<std::vector<std::uint32_t>> found(roots.size());
+  std::vector<Stats> counts(roots.size());
+  tbb::task_arena arena(std::min(static_cast<int>(options_.threads), tbb::info::default_concurrency()));
+  arena.execute([&] {
+    tbb::parallel_for(std::size_t{0}, roots.size(),
+                      [&](std::size_t i) { find_visible(objects_, roots[i], cell.single, scratch.cube, found[i], counts[i]); });
+  });
+  for (std::size_t i = 0; i < roots.size(); ++i) {
+    scratch.visible.insert(scratch.visible.end(), found[i].begin(), found[i].end());
+    stats.nodes_tested += counts[i].nodes_tested;
+  }
+}
+
+}  // namespace ivis
