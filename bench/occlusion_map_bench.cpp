@@ -1,7 +1,8 @@
-// The CPU occlusion map against the pinned yardstick, in one run on one thread: medians of CPU time a pose, interleaved
-// round by round, and a hash of all answers, so that a fast wrong answer shows; then the same by SIMD target.
+// The CPU occlusion map against the pinned yardstick, in one run on one thread: medians of CPU time
+// a pose, interleaved round by round, and a hash of all answers, so that a fast wrong answer shows;
+// then the same by SIMD target.
 //
-//   occlusion_map_bench SCENE.glb PATH.csv REACH [ROUNDS] [PIXELS]
+//   occlusion_map_bench SCENE.glb PATH.csv REACH [ROUNDS] [PIXELS] [targets]
 
 #include <algorithm>
 #include <cstdio>
@@ -53,7 +54,8 @@ struct Subject {
   std::uint64_t hash = 1469598103934665603ULL;
   OcclusionMap::Stats stats;
 
-  Subject(std::string n, Scene s, const Reach& reach, std::uint32_t pixels) : name(std::move(n)), scene(std::move(s)) {
+  Subject(std::string n, Scene s, const Reach& reach, std::uint32_t pixels)
+      : name(std::move(n)), scene(std::move(s)) {
     ShrinkOptions options;
     options.reach = reach;
     occluders = get(shrink(scene, options, FastEroder{})).set;
@@ -89,7 +91,9 @@ struct Subject {
 
 int main(int argc, char** argv) {
   if (argc < 4) {
-    std::fprintf(stderr, "usage: occlusion_map_bench SCENE.glb PATH.csv REACH [ROUNDS] [PIXELS]\n");
+    std::fprintf(
+        stderr,
+        "usage: occlusion_map_bench SCENE.glb PATH.csv REACH [ROUNDS] [PIXELS] [targets]\n");
     return 2;
   }
   const std::vector<Pose> path = get(read_path(argv[2]));
@@ -114,22 +118,29 @@ int main(int argc, char** argv) {
       yard_ms.push_back(cpu_ms() - begin);
       if (r == 0) yard_boxes.push_back(static_cast<double>(n));
     }
-    for (auto& s : subjects) s->run(path, reach, r == 0);
+    for (auto& s : subjects)
+      s->run(path, reach, r == 0);
   }
   const double yard = median(yard_ms);
-  std::printf("%zu poses, %d rounds, reach %s, %u pixels a face\n", path.size(), rounds, argv[3], pixels);
+  std::printf("%zu poses, %d rounds, reach %s, %u pixels a face\n", path.size(), rounds, argv[3],
+              pixels);
   std::printf("%-10s %9.4f ms a pose  %6.0f boxes\n", "yardstick", yard, median(yard_boxes));
   for (const auto& s : subjects) {
     const double ms = median(s->ms);
     const auto poses = static_cast<double>(path.size());
-    std::printf("%-10s %9.4f ms a pose  %6.0f boxes (%.0f objects of %zu)  yardstick / it %.1f  hash %016llx\n", s->name.c_str(), ms,
-                median(s->boxes), median(s->counts), s->scene.objects.size(), yard / ms, static_cast<unsigned long long>(s->hash));
-    std::printf("           a pose: %.0f pieces drawn of %.0f tested, %.0f faces, %.0f blocks, %.0f nodes tested\n",
-                s->stats.pieces_drawn / poses, s->stats.pieces_tested / poses, s->stats.faces_drawn / poses,
-                s->stats.blocks_drawn / poses, s->stats.nodes_tested / poses);
+    std::printf(
+        "%-10s %9.4f ms a pose  %6.0f boxes (%.0f objects of %zu)  yardstick / it %.1f  hash "
+        "%016llx\n",
+        s->name.c_str(), ms, median(s->boxes), median(s->counts), s->scene.objects.size(),
+        yard / ms, static_cast<unsigned long long>(s->hash));
+    std::printf(
+        "           a pose: %.0f pieces drawn of %.0f tested, %.0f faces, %.0f blocks, %.0f nodes "
+        "tested\n",
+        s->stats.pieces_drawn / poses, s->stats.pieces_tested / poses, s->stats.faces_drawn / poses,
+        s->stats.blocks_drawn / poses, s->stats.nodes_tested / poses);
   }
   for (const char* target : depth_targets()) {
-    if (!use_depth_target(target)) continue;
+    if (argc <= 6 || !use_depth_target(target)) continue;
     Subject& s = *subjects.front();
     s.ms.clear();
     s.run(path, reach, false);

@@ -23,8 +23,8 @@ struct Open {
 
 }  // namespace
 
-// A sweep over the corners' y. Between two of them no edges cross (rings do not), so the edges there, ordered by
-// x, pair up even-odd; a pair that goes on past a corner stays one trapezoid.
+// A sweep over the corners' y. Between two of them no edges cross (rings do not), so the edges
+// there, ordered by x, pair up even-odd; a pair that goes on past a corner stays one trapezoid.
 std::vector<std::array<Vec2, 4>> convex_parts(const Polygon& polygon) {
   std::vector<Edge> edges;
   std::vector<double> levels;
@@ -39,7 +39,8 @@ std::vector<std::array<Vec2, 4>> convex_parts(const Polygon& polygon) {
     }
   std::sort(levels.begin(), levels.end());
   levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
-  std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) { return a.low.y < b.low.y; });
+  std::sort(edges.begin(), edges.end(),
+            [](const Edge& a, const Edge& b) { return a.low.y < b.low.y; });
 
   std::vector<std::array<Vec2, 4>> parts;
   const auto close = [&](const Open& o, double to) {
@@ -63,20 +64,25 @@ std::vector<std::array<Vec2, 4>> convex_parts(const Polygon& polygon) {
     const double from = levels[l];
     const double middle = 0.5 * (from + levels[l + 1]);
     std::erase_if(active, [&](const Edge* e) { return e->high.y <= from; });
-    for (; next < edges.size() && edges[next].low.y <= from; ++next) active.push_back(&edges[next]);
-    std::sort(active.begin(), active.end(), [&](const Edge* a, const Edge* b) { return a->x_at(middle) < b->x_at(middle); });
+    for (; next < edges.size() && edges[next].low.y <= from; ++next)
+      active.push_back(&edges[next]);
+    std::sort(active.begin(), active.end(),
+              [&](const Edge* a, const Edge* b) { return a->x_at(middle) < b->x_at(middle); });
     std::vector<Open> now;
     for (std::size_t i = 0; i + 1 < active.size(); i += 2) {
-      const auto same = std::find_if(open.begin(), open.end(),
-                                     [&](const Open& o) { return o.left == active[i] && o.right == active[i + 1]; });
+      const auto same = std::find_if(open.begin(), open.end(), [&](const Open& o) {
+        return o.left == active[i] && o.right == active[i + 1];
+      });
       now.push_back(same != open.end() ? *same : Open{active[i], active[i + 1], from});
     }
     for (const Open& o : open)
-      if (std::none_of(now.begin(), now.end(), [&](const Open& n) { return n.left == o.left && n.right == o.right; }))
+      if (std::none_of(now.begin(), now.end(),
+                       [&](const Open& n) { return n.left == o.left && n.right == o.right; }))
         close(o, from);
     open = std::move(now);
   }
-  for (const Open& o : open) close(o, levels.back());
+  for (const Open& o : open)
+    close(o, levels.back());
   return parts;
 }
 
@@ -87,8 +93,8 @@ FaceMesh mesh_of(const Prism& prism) {
     mesh.points.emplace_back(p.x, y, p.y);
     return static_cast<std::uint32_t>(mesh.points.size() - 1);
   };
-  // With x to the right and z up the page the interior is on the left; y then points into the page, so that outside a
-  // wall is walked bottom first.
+  // With x to the right and z up the page the interior is on the left; y then points into the page,
+  // so that outside a wall is walked bottom first.
   for (const auto& ring : prism.footprint.rings) {
     const auto n = static_cast<std::uint32_t>(ring.size());
     const auto base = static_cast<std::uint32_t>(mesh.points.size());

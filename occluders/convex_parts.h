@@ -8,14 +8,15 @@
 
 namespace ivis {
 
-/// Partition of the region that the polygon fills (even-odd) into trapezoids with two sides along x;
-/// a triangle repeats its third corner. Positive shoelace area each.
-/// Guarantee: the parts lie inside the region but for rounding of corners along its edges (1e-15 of the
+/// Partition of the region that the polygon fills (even-odd) into trapezoids with two sides along
+/// x; a triangle repeats its third corner. Positive shoelace area each. Guarantee: the parts lie
+/// inside the region but for rounding of corners along its edges (1e-15 of the
 ///            coordinates, which the slack of occluder sets pays for).
 /// Cost:      O(n^2) in corners at worst. Threads: reentrant.
 std::vector<std::array<Vec2, 4>> convex_parts(const Polygon& polygon);
 
-/// Boundary of footprint x [bottom, top]: walls, roof and underside. A prism without height is empty.
+/// Boundary of footprint x [bottom, top]: walls, roof and underside. A prism without height is
+/// empty.
 FaceMesh mesh_of(const Prism& prism);
 
 }  // namespace ivis

@@ -7,8 +7,8 @@
 
 namespace ivis {
 
-std::vector<Polygon> gated_erosion(const Polygon& region, const Reach& reach, const Eroder& eroder, double min_area_m2,
-                                   std::size_t& failed) {
+std::vector<Polygon> gated_erosion(const Polygon& region, const Reach& reach, const Eroder& eroder,
+                                   double min_area_m2, std::size_t& failed) {
   std::vector<Polygon> out;
   for (Polygon& piece : eroder.erode(region, reach)) {
     if (area(piece) < min_area_m2) continue;

@@ -18,7 +18,8 @@ Aabb bounds_of(const std::vector<Polygon>& region) {
   Aabb box;
   for (const Polygon& p : region)
     for (const auto& ring : p.rings)
-      for (const Vec2& c : ring) box.add(Vec3{c.x, 0, c.y});
+      for (const Vec2& c : ring)
+        box.add(Vec3{c.x, 0, c.y});
   return box;
 }
 
@@ -30,15 +31,17 @@ std::vector<Polygon> within(const Polygon& polygon, const Vec2& lo, const Vec2& 
   const Vec2 far_hi{std::max(b.hi.x, hi.x) + 1, std::max(b.hi.z, hi.y) + 1};
   const auto box = [](const Vec2& p, const Vec2& q) { return Ring{p, {q.x, p.y}, q, {p.x, q.y}}; };
   return subtract(polygon.rings, Fill::kEvenOdd,
-                  {box(far_lo, {lo.x, far_hi.y}), box({hi.x, far_lo.y}, far_hi), box(far_lo, {far_hi.x, lo.y}),
-                   box({far_lo.x, hi.y}, far_hi)});
+                  {box(far_lo, {lo.x, far_hi.y}), box({hi.x, far_lo.y}, far_hi),
+                   box(far_lo, {far_hi.x, lo.y}), box({far_lo.x, hi.y}, far_hi)});
 }
 
 /// One stack's parts by grid cell.
-std::vector<PrismPiece> pieces_of(const FusedStack& stack, const Reach& padded_reach, const Eroder& eroder, double part_m,
-                                  const OccluderSet& set, std::size_t& failed) {
+std::vector<PrismPiece> pieces_of(const FusedStack& stack, const Reach& padded_reach,
+                                  const Eroder& eroder, double part_m, const OccluderSet& set,
+                                  std::size_t& failed) {
   Aabb whole;
-  for (const FusedLevel& level : stack.levels) whole.add(bounds_of(level.region));
+  for (const FusedLevel& level : stack.levels)
+    whole.add(bounds_of(level.region));
   if (whole.empty()) return {};
   const Vec3 size = whole.size();
   const bool cut = std::max(size.x, size.z) > 1.5 * part_m;
@@ -59,7 +62,8 @@ std::vector<PrismPiece> pieces_of(const FusedStack& stack, const Reach& padded_r
           const auto add = [&](int column, int row, Polygon part) {
             auto& levels = pieces[{row, column}].levels;
             if (levels.size() <= k) levels.resize(k + 1);
-            levels[k].push_back({std::move(part), std::min(raised, top), top, stack.bottom, stack.grounded});
+            levels[k].push_back(
+                {std::move(part), std::min(raised, top), top, stack.bottom, stack.grounded});
           };
           if (!cut) {
             add(0, 0, eroded);
@@ -69,8 +73,10 @@ std::vector<PrismPiece> pieces_of(const FusedStack& stack, const Reach& padded_r
           const auto cell = [](double v, double lo, double s, double n) {
             return static_cast<int>(std::clamp(std::floor((v - lo) / s), 0.0, n - 1));
           };
-          for (int r = cell(b.lo.z, whole.lo.z, step.y, rows); r <= cell(b.hi.z, whole.lo.z, step.y, rows); ++r)
-            for (int c = cell(b.lo.x, whole.lo.x, step.x, columns); c <= cell(b.hi.x, whole.lo.x, step.x, columns); ++c) {
+          for (int r = cell(b.lo.z, whole.lo.z, step.y, rows);
+               r <= cell(b.hi.z, whole.lo.z, step.y, rows); ++r)
+            for (int c = cell(b.lo.x, whole.lo.x, step.x, columns);
+                 c <= cell(b.hi.x, whole.lo.x, step.x, columns); ++c) {
               const Vec2 lo{whole.lo.x + c * step.x, whole.lo.z + r * step.y};
               for (Polygon& part : within(eroded, lo, lo + step))
                 if (area(part) >= kMinAreaM2) add(c, r, std::move(part));
@@ -79,7 +85,8 @@ std::vector<PrismPiece> pieces_of(const FusedStack& stack, const Reach& padded_r
     }
   }
   std::vector<PrismPiece> out;
-  for (auto& [cell, piece] : pieces) out.push_back(std::move(piece));
+  for (auto& [cell, piece] : pieces)
+    out.push_back(std::move(piece));
   return out;
 }
 
@@ -90,8 +97,9 @@ std::vector<double> default_margins(double radius_m) {
   return {0.1, 0.25, 0.5, 1, 2, 4};
 }
 
-std::size_t add_prism_ladder(const std::vector<FusedStack>& stacks, const Reach& padded_reach, const Eroder& eroder,
-                             const PrismLadderOptions& options, OccluderSet& set, const Context& context) {
+std::size_t add_prism_ladder(const std::vector<FusedStack>& stacks, const Reach& padded_reach,
+                             const Eroder& eroder, const PrismLadderOptions& options,
+                             OccluderSet& set, const Context& context) {
   std::vector<std::vector<PrismPiece>> found(stacks.size());
   std::atomic<std::size_t> failed{0};
   Progress progress(context, "margins", stacks.size());
@@ -102,7 +110,8 @@ std::size_t add_prism_ladder(const std::vector<FusedStack>& stacks, const Reach&
     progress.step();
   });
   for (auto& list : found)
-    for (PrismPiece& piece : list) set.prism_pieces.push_back(std::move(piece));
+    for (PrismPiece& piece : list)
+      set.prism_pieces.push_back(std::move(piece));
   return failed;
 }
 

@@ -10,7 +10,8 @@ Status check_cell(const ViewCell& cell, const OccluderSet& occluders) {
   if (!std::isfinite(cell.eye.x) || !std::isfinite(cell.eye.y) || !std::isfinite(cell.eye.z))
     return invalid_argument("the eye is not finite");
   if (!padded(occluders.reach, occluders.slack_m).contains(padded(cell.reach, occluders.slack_m)))
-    return invalid_argument("reach " + cell.reach.to_string() + " is larger than the occluders were shrunk for, " +
+    return invalid_argument("reach " + cell.reach.to_string() +
+                            " is larger than the occluders were shrunk for, " +
                             occluders.reach.to_string());
   return ok();
 }
@@ -22,7 +23,8 @@ Pvs empty_answer(const Scene& scene, const ViewCell& cell) {
   return pvs;
 }
 
-std::string why_everything(const Vec3& eye, const Vec3& origin, const SolidIndex& solids, double slack_m) {
+std::string why_everything(const Vec3& eye, const Vec3& origin, const SolidIndex& solids,
+                           double slack_m) {
   if (solids.holds(eye)) return "eye inside an occluder";
   const Vec3 local = eye - origin;
   for (int i = 0; i < 3; ++i)
@@ -37,15 +39,19 @@ void list_everything(const Scene& scene, std::string why, Pvs& pvs) {
   pvs.everything_because = std::move(why);
 }
 
-void list_ascending(std::size_t objects, const std::vector<std::uint32_t>& found, const std::vector<ObjectId>& always,
-                    std::vector<std::uint64_t>& bits, Pvs& pvs) {
+void list_ascending(std::size_t objects, const std::vector<std::uint32_t>& found,
+                    const std::vector<ObjectId>& always, std::vector<std::uint64_t>& bits,
+                    Pvs& pvs) {
   bits.assign((objects + 63) / 64, 0);
-  for (const std::uint32_t id : found) bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
-  for (const ObjectId id : always) bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
+  for (const std::uint32_t id : found)
+    bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
+  for (const ObjectId id : always)
+    bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
   pvs.objects.reserve(found.size() + always.size());
   for (std::size_t w = 0; w < bits.size(); ++w)
     for (std::uint64_t m = bits[w]; m != 0; m &= m - 1)
-      pvs.objects.push_back(static_cast<ObjectId>(w * 64 + static_cast<std::size_t>(std::countr_zero(m))));
+      pvs.objects.push_back(
+          static_cast<ObjectId>(w * 64 + static_cast<std::size_t>(std::countr_zero(m))));
 }
 
 }  // namespace ivis

@@ -13,22 +13,26 @@
 
 namespace ivis {
 
-/// Errors: kInvalidArgument if the eye is not finite or the occluders were not shrunk for the cell's reach.
+/// Errors: kInvalidArgument if the eye is not finite or the occluders were not shrunk for the
+/// cell's reach.
 Status check_cell(const ViewCell& cell, const OccluderSet& occluders);
 
 /// An answer that lists nothing yet.
 Pvs empty_answer(const Scene& scene, const ViewCell& cell);
 
-/// Why everything must be listed for this cell; empty if that need not be: the eye is in no solid, and subtracting
-/// boxes from the eye (relative to `origin`, where maps hold both in single precision) errs by less than the slack.
-std::string why_everything(const Vec3& eye, const Vec3& origin, const SolidIndex& solids, double slack_m);
+/// Why everything must be listed for this cell; empty if that need not be: the eye is in no solid,
+/// and subtracting boxes from the eye (relative to `origin`, where maps hold both in single
+/// precision) errs by less than the slack.
+std::string why_everything(const Vec3& eye, const Vec3& origin, const SolidIndex& solids,
+                           double slack_m);
 
 /// Every object of the scene, because of `why`.
 void list_everything(const Scene& scene, std::string why, Pvs& pvs);
 
-/// Ascending ids, each once, of two lists in any order: by way of bits, cheaper than sorting and the same for any
-/// number of threads. `bits` is scratch.
-void list_ascending(std::size_t objects, const std::vector<std::uint32_t>& found, const std::vector<ObjectId>& always,
-                    std::vector<std::uint64_t>& bits, Pvs& pvs);
+/// Ascending ids, each once, of two lists in any order: by way of bits, cheaper than sorting and
+/// the same for any number of threads. `bits` is scratch.
+void list_ascending(std::size_t objects, const std::vector<std::uint32_t>& found,
+                    const std::vector<ObjectId>& always, std::vector<std::uint64_t>& bits,
+                    Pvs& pvs);
 
 }  // namespace ivis

@@ -30,11 +30,13 @@ class Maker {
     if (!any) return;
     begin(p);
     p.first_real_level = p.first_level;
-    for (const auto& level : piece.levels) add_level(level, false, deep);
+    for (const auto& level : piece.levels)
+      add_level(level, false, deep);
     if (floored || grounded) {
       p.kind = floored ? OccluderPieces::Kind::kFloored : OccluderPieces::Kind::kGrounded;
       p.first_level = static_cast<std::uint32_t>(out_.levels.size());
-      for (const auto& level : piece.levels) add_level(level, true, deep);
+      for (const auto& level : piece.levels)
+        add_level(level, true, deep);
     }
     p.levels = static_cast<std::uint32_t>(piece.levels.size());
     end(p);
@@ -69,7 +71,8 @@ class Maker {
 
   void finish() {
     std::vector<std::uint32_t> items(boxes_.size());
-    for (std::uint32_t i = 0; i < items.size(); ++i) items[i] = i;
+    for (std::uint32_t i = 0; i < items.size(); ++i)
+      items[i] = i;
     out_.tree = BoxTree::build(boxes_, items, out_.origin);
   }
 
@@ -108,7 +111,8 @@ class Maker {
   void add_mesh(const FaceMesh& mesh, const Vec3* normal = nullptr) {
     for (const auto& face : mesh.faces) {
       Vec3 p[4];
-      for (std::size_t k = 0; k < 4; ++k) p[k] = mesh.points[face[k]];
+      for (std::size_t k = 0; k < 4; ++k)
+        p[k] = mesh.points[face[k]];
       // Of two diagonals: right for a triangle too.
       Vec3 n = glm::cross(p[2] - p[0], p[3] - p[1]);
       const double length = glm::length(n);
@@ -151,10 +155,14 @@ OccluderPieces make_pieces(const Scene& scene, const OccluderSet& occluders, con
   out.margins_m = occluders.margins_m;
   out.sheet_radii_m = occluders.sheet_radii_m;
   Maker maker(occluders, out);
-  const double deep = std::min(occluders.floor, scene.bounds.empty() ? 0 : scene.bounds.lo.y) - kBelowFloorM;
-  for (const PrismPiece& piece : occluders.prism_pieces) maker.add_prisms(piece, deep);
-  for (const SolidPiece& piece : occluders.solid_pieces) maker.add_solid(piece);
-  for (const Sheet& sheet : occluders.sheets) maker.add_sheet(sheet);
+  const double deep =
+      std::min(occluders.floor, scene.bounds.empty() ? 0 : scene.bounds.lo.y) - kBelowFloorM;
+  for (const PrismPiece& piece : occluders.prism_pieces)
+    maker.add_prisms(piece, deep);
+  for (const SolidPiece& piece : occluders.solid_pieces)
+    maker.add_solid(piece);
+  for (const Sheet& sheet : occluders.sheets)
+    maker.add_sheet(sheet);
   maker.finish();
   return out;
 }

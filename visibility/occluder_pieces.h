@@ -11,7 +11,8 @@
 
 namespace ivis {
 
-/// An occluder set's pieces and sheets as the depth cube draws them: single precision relative to `origin`.
+/// An occluder set's pieces and sheets as the depth cube draws them: single precision relative to
+/// `origin`.
 struct OccluderPieces {
   /// When a piece may be drawn as it is.
   enum class Kind : std::uint8_t {
@@ -27,9 +28,10 @@ struct OccluderPieces {
   struct Piece {
     Kind kind = Kind::kSolid;
     std::uint32_t first_level = 0;  ///< into `levels`
-    std::uint32_t levels = 0;       ///< entry k is drawn at margins_m[k], of a sheet at sheet_radii_m[k]
-    std::uint32_t first_real_level = 0;  ///< of a floored or grounded prism: as it stands, where its rule does not hold
-    glm::vec3 lo{0}, hi{0};         ///< of all that may be drawn
+    std::uint32_t levels = 0;  ///< entry k is drawn at margins_m[k], of a sheet at sheet_radii_m[k]
+    std::uint32_t first_real_level =
+        0;  ///< of a floored or grounded prism: as it stands, where its rule does not hold
+    glm::vec3 lo{0}, hi{0};  ///< of all that may be drawn
     // Of a sheet: it is { x : normal.x = offset } relative to the origin.
     Vec3 normal{0};
     double offset = 0;
@@ -43,7 +45,9 @@ struct OccluderPieces {
   std::vector<Piece> pieces;
   BoxTree tree;  ///< of the pieces; items are indices into `pieces`
 
-  std::span<const FaceBatch> faces(const Level& level) const { return {batches.data() + level.first_batch, level.batches}; }
+  std::span<const FaceBatch> faces(const Level& level) const {
+    return {batches.data() + level.first_batch, level.batches};
+  }
 };
 
 /// Cost: O(faces). Ownership: keeps nothing of its arguments.

@@ -14,9 +14,9 @@
 namespace ivis {
 namespace {
 
-/// A pixel's half diagonal at depth w of a map of n pixels a side is sqrt(2) w / n; 1 % more pays for rounding.
+/// A pixel's half diagonal at depth w of a map of n pixels a side is sqrt(2) w / n; 1 % more pays
+/// for rounding.
 constexpr double kMarginFactor = 1.01 * std::numbers::sqrt2;
-constexpr std::uint32_t kAllSides = 0x3f;
 constexpr std::uint32_t kHorizontalSides = 0x33;  ///< that look along x and z
 
 /// Where 16 bits of depth should be spent: what is nearer than this counts as visible.
@@ -35,6 +35,7 @@ struct OcclusionMap::Cell {
   double radius;  ///< of a ball about the eye that holds the cell
   bool above_floor;
   bool on_ground;
+  std::uint32_t sides;  ///< of the cube that are of use
 };
 
 struct OcclusionMap::Scratch {
@@ -45,14 +46,19 @@ struct OcclusionMap::Scratch {
     float distance;  ///< squared, of its box
     std::uint32_t node;
     std::uint32_t child;
-    bool operator<(const Entry& o) const { return distance != o.distance ? distance > o.distance : node != o.node ? node > o.node : child > o.child; }
+    bool operator<(const Entry& o) const {
+      return distance != o.distance ? distance > o.distance
+             : node != o.node       ? node > o.node
+                                    : child > o.child;
+    }
   };
   std::vector<Entry> queue;
   std::vector<std::uint32_t> visible;
   std::vector<std::uint64_t> bits;
 };
 
-OcclusionMap::OcclusionMap(const Scene& scene, const OccluderSet& occluders, const MethodOptions& options, const OcclusionGuards& guards)
+OcclusionMap::OcclusionMap(const Scene& scene, const OccluderSet& occluders,
+                           const MethodOptions& options, const OcclusionGuards& guards)
     : scene_(scene),
       occluders_(occluders),
       options_(options),
@@ -78,8 +84,9 @@ OcclusionMap::OcclusionMap(const Scene& scene, const OccluderSet& occluders, con
 OcclusionMap::~OcclusionMap() = default;
 
 MethodTraits OcclusionMap::make_traits() {
-  return {"occlusion-map", Guarantee::kConservative, true,
-          "depth maps of shrunk occluders of every kind (Wonka, Wimmer, Sillion 2001, section 5.2)"};
+  return {
+      "occlusion-map", Guarantee::kConservative, true,
+      "depth maps of shrunk occluders of every kind (Wonka, Wimmer, Sillion 2001, section 5.2)"};
 }
 
 const MethodTraits& OcclusionMap::traits() const {
@@ -114,20 +121,29 @@ Result<Pvs> OcclusionMap::solve(const ViewCell& cell, Stats& stats) const {
   }
   Cell c;
   c.eye = cell.eye - origin_;
-  for (int i = 0; i < 3; ++i) c.single[i] = static_cast<float>(c.eye[i]);
+  for (int i = 0; i < 3; ++i)
+    c.single[i] = static_cast<float>(c.eye[i]);
   c.reach = padded(cell.reach, occluders_.slack_m);
   const Vec3 half = c.reach.half_extents();
-  c.radius = c.reach.kind() == Reach::Kind::kBox        ? glm::length(half)
-             : c.reach.kind() == Reach::Kind::kCylinder ? std::hypot(std::max(half.x, half.z), half.y)
-                                                        : std::max({half.x, half.y, half.z});
+  c.radius = c.reach.kind() == Reach::Kind::kBox ? glm::length(half)
+             : c.reach.kind() == Reach::Kind::kCylinder
+                 ? std::hypot(std::max(half.x, half.z), half.y)
+                 : std::max({half.x, half.y, half.z});
   const Aabb box{cell.eye - half, cell.eye + half};
   c.above_floor = box.lo.y >= occluders_.floor;
   const Aabb& ground = occluders_.ground;
-  c.on_ground = !ground.empty() && box.lo.x >= ground.lo.x && box.hi.x <= ground.hi.x && box.lo.z >= ground.lo.z &&
-                box.hi.z <= ground.hi.z;
+  c.on_ground = !ground.empty() && box.lo.x >= ground.lo.x && box.hi.x <= ground.hi.x &&
+                box.lo.z >= ground.lo.z && box.hi.z <= ground.hi.z;
 
   auto scratch = take_scratch();
   scratch->cube.clear();
+  glm::vec3 lo;
+  glm::vec3 hi;
+  for (int i = 0; i < 3; ++i) {
+    lo[i] = static_cast<float>(scene_.bounds.lo[i] - cell.eye[i]) - 1.0F;  // more than rounding
+    hi[i] = static_cast<float>(scene_.bounds.hi[i] - cell.eye[i]) + 1.0F;
+  }
+  c.sides = scratch->cube.look_at(lo, hi);
   scratch->visible.clear();
   draw(c, *scratch, stats);
   find(c, *scratch, stats);
@@ -136,12 +152,14 @@ Result<Pvs> OcclusionMap::solve(const ViewCell& cell, Stats& stats) const {
   return pvs;
 }
 
-/// Near pieces first; whole branches that what is drawn hides are passed over, which is always safe.
+/// Near pieces first; whole branches that what is drawn hides are passed over, which is always
+/// safe.
 void OcclusionMap::draw(const Cell& cell, Scratch& scratch, Stats& stats) const {
   const BoxTree& tree = pieces_.tree;
   if (tree.nodes.empty()) return;
   if (options_.max_occluders > 0 && options_.max_occluders < pieces_.pieces.size()) {
-    for (const std::uint32_t p : largest_pieces(cell)) draw_piece(pieces_.pieces[p], kAllSides, cell, scratch, stats);
+    for (const std::uint32_t p : largest_pieces(cell))
+      draw_piece(pieces_.pieces[p], cell.sides, cell, scratch, stats);
     return;
   }
   auto& queue = scratch.queue;
@@ -152,10 +170,13 @@ void OcclusionMap::draw(const Cell& cell, Scratch& scratch, Stats& stats) const 
     find_sides(node, cell.single, scratch.cube, 0xffff, sides);
     ++stats.nodes_tested;
     for (std::uint32_t c = 0; c < node.count; ++c) {
-      if (sides[c] == 0) continue;
-      const float dx = std::max({node.lo_x[c] - cell.single[0], cell.single[0] - node.hi_x[c], 0.0F});
-      const float dy = std::max({node.lo_y[c] - cell.single[1], cell.single[1] - node.hi_y[c], 0.0F});
-      const float dz = std::max({node.lo_z[c] - cell.single[2], cell.single[2] - node.hi_z[c], 0.0F});
+      if ((sides[c] & cell.sides) == 0) continue;
+      const float dx =
+          std::max({node.lo_x[c] - cell.single[0], cell.single[0] - node.hi_x[c], 0.0F});
+      const float dy =
+          std::max({node.lo_y[c] - cell.single[1], cell.single[1] - node.hi_y[c], 0.0F});
+      const float dz =
+          std::max({node.lo_z[c] - cell.single[2], cell.single[2] - node.hi_z[c], 0.0F});
       queue.push_back({dx * dx + dy * dy + dz * dz, index, c});
       std::push_heap(queue.begin(), queue.end());
     }
@@ -173,37 +194,45 @@ void OcclusionMap::draw(const Cell& cell, Scratch& scratch, Stats& stats) const 
     }
     ++stats.pieces_tested;
     find_sides(node, cell.single, scratch.cube, 1U << e.child, sides);
-    if (sides[e.child] != 0) draw_piece(pieces_.pieces[child & ~BoxTree::kItem], sides[e.child], cell, scratch, stats);
+    if ((sides[e.child] & cell.sides) != 0)
+      draw_piece(pieces_.pieces[child & ~BoxTree::kItem], sides[e.child] & cell.sides, cell,
+                 scratch, stats);
   }
 }
 
 /// At the first margin that covers a pixel at the piece's far side; not at all where none does.
-void OcclusionMap::draw_piece(const OccluderPieces::Piece& piece, std::uint32_t sides, const Cell& cell, Scratch& scratch,
-                              Stats& stats) const {
+void OcclusionMap::draw_piece(const OccluderPieces::Piece& piece, std::uint32_t sides,
+                              const Cell& cell, Scratch& scratch, Stats& stats) const {
   double far[3];
   double across = 0;  // squared distance of the farthest corner
   for (int i = 0; i < 3; ++i) {
-    far[i] = std::max(std::abs(static_cast<double>(piece.lo[i]) - cell.eye[i]), std::abs(static_cast<double>(piece.hi[i]) - cell.eye[i]));
+    far[i] = std::max(std::abs(static_cast<double>(piece.lo[i]) - cell.eye[i]),
+                      std::abs(static_cast<double>(piece.hi[i]) - cell.eye[i]));
     across += far[i] * far[i];
   }
   const auto pixels = static_cast<double>(options_.map_pixels);
   const auto margin_at = [&](double w) { return kMarginFactor * w / pixels; };
   std::uint32_t level = 0;
   if (piece.kind == OccluderPieces::Kind::kSheet) {
-    // docs/theory.md, 9: the line of sight through a pixel meets the plane within r of where its centre's ray does, at most
-    // D + r away, so its angle's cosine is at least a / (D + r); r = (R + margin) (D + r) / a, solved for r.
+    // docs/theory.md, 9: the line of sight through a pixel meets the plane within r of where its
+    // centre's ray does, at most D + r away, so its angle's cosine is at least a / (D + r); r = (R
+    // + margin) (D + r) / a, solved for r.
     const double a = glm::dot(piece.normal, cell.eye) - piece.offset;
     const double needed = cell.radius + margin_at(std::max({far[0], far[1], far[2]}));
     if (a <= 1.001 * needed) return;
     double r = needed * std::sqrt(across) / (a - needed) * (1 + 1e-6);
     if (!guards_.sheet_obliqueness) r = needed;
-    while (level < piece.levels && pieces_.sheet_radii_m[level] < r) ++level;
+    while (level < piece.levels && pieces_.sheet_radii_m[level] < r)
+      ++level;
   } else {
     const double m = margin_at(std::max(far[0], far[2]));
     if (guards_.pixel_margin)
-      while (level < piece.levels && pieces_.margins_m[level] < m) ++level;
+      while (level < piece.levels && pieces_.margins_m[level] < m)
+        ++level;
     // A prism drawn far down may be deeper on the faces that look down than the margin allows.
-    if (level < piece.levels && guards_.pixel_margin && pieces_.margins_m[level] < margin_at(far[1])) sides &= kHorizontalSides;
+    if (level < piece.levels && guards_.pixel_margin &&
+        pieces_.margins_m[level] < margin_at(far[1]))
+      sides &= kHorizontalSides;
   }
   if (level >= piece.levels || sides == 0) return;
   std::uint32_t first = piece.first_level;
@@ -213,7 +242,8 @@ void OcclusionMap::draw_piece(const OccluderPieces::Piece& piece, std::uint32_t 
   const OccluderPieces::Level& faces = pieces_.levels[first + level];
   if (faces.batches == 0) return;
   ++stats.pieces_drawn;
-  draw_faces(pieces_.faces(faces), cell.single, sides, piece.kind == OccluderPieces::Kind::kSheet, scratch.cube, stats);
+  draw_faces(pieces_.faces(faces), cell.single, sides, piece.kind == OccluderPieces::Kind::kSheet,
+             scratch.cube, stats);
 }
 
 /// The options_.max_occluders pieces of largest projected area, near ones first.
@@ -229,17 +259,24 @@ std::vector<std::uint32_t> OcclusionMap::largest_pieces(const Cell& cell) const 
     const Vec3 size = Vec3(piece.hi) - Vec3(piece.lo);
     Vec3 gap{0};
     for (int i = 0; i < 3; ++i)
-      gap[i] = std::max({static_cast<double>(piece.lo[i]) - cell.eye[i], cell.eye[i] - static_cast<double>(piece.hi[i]), 0.0});
+      gap[i] = std::max({static_cast<double>(piece.lo[i]) - cell.eye[i],
+                         cell.eye[i] - static_cast<double>(piece.hi[i]), 0.0});
     const double distance = std::max(glm::length(gap), 0.1);
     all.push_back({glm::dot(size, size) / (distance * distance), distance, p});
   }
-  const auto larger = [](const Candidate& a, const Candidate& b) { return a.area != b.area ? a.area > b.area : a.piece < b.piece; };
-  const auto nearer = [](const Candidate& a, const Candidate& b) { return a.distance != b.distance ? a.distance < b.distance : a.piece < b.piece; };
-  const auto end = all.begin() + static_cast<std::ptrdiff_t>(std::min(options_.max_occluders, all.size()));
+  const auto larger = [](const Candidate& a, const Candidate& b) {
+    return a.area != b.area ? a.area > b.area : a.piece < b.piece;
+  };
+  const auto nearer = [](const Candidate& a, const Candidate& b) {
+    return a.distance != b.distance ? a.distance < b.distance : a.piece < b.piece;
+  };
+  const auto end =
+      all.begin() + static_cast<std::ptrdiff_t>(std::min(options_.max_occluders, all.size()));
   std::nth_element(all.begin(), end, all.end(), larger);
   std::sort(all.begin(), end, nearer);
   std::vector<std::uint32_t> chosen;
-  for (auto it = all.begin(); it != end; ++it) chosen.push_back(it->piece);
+  for (auto it = all.begin(); it != end; ++it)
+    chosen.push_back(it->piece);
   return chosen;
 }
 
@@ -253,15 +290,18 @@ void OcclusionMap::find(const Cell& cell, Scratch& scratch, Stats& stats) const 
   std::vector<std::uint32_t> roots{0};
   while (!roots.empty() && roots.size() < 8U * options_.threads) {
     std::vector<std::uint32_t> next;
-    for (const std::uint32_t r : roots) find_visible_children(objects_, r, cell.single, scratch.cube, scratch.visible, next, stats);
+    for (const std::uint32_t r : roots)
+      find_visible_children(objects_, r, cell.single, scratch.cube, scratch.visible, next, stats);
     roots = std::move(next);
   }
   std::vector<std::vector<std::uint32_t>> found(roots.size());
   std::vector<Stats> counts(roots.size());
-  tbb::task_arena arena(std::min(static_cast<int>(options_.threads), tbb::info::default_concurrency()));
+  tbb::task_arena arena(
+      std::min(static_cast<int>(options_.threads), tbb::info::default_concurrency()));
   arena.execute([&] {
-    tbb::parallel_for(std::size_t{0}, roots.size(),
-                      [&](std::size_t i) { find_visible(objects_, roots[i], cell.single, scratch.cube, found[i], counts[i]); });
+    tbb::parallel_for(std::size_t{0}, roots.size(), [&](std::size_t i) {
+      find_visible(objects_, roots[i], cell.single, scratch.cube, found[i], counts[i]);
+    });
   });
   for (std::size_t i = 0; i < roots.size(); ++i) {
     scratch.visible.insert(scratch.visible.end(), found[i].begin(), found[i].end());

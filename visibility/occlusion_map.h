@@ -12,27 +12,32 @@
 
 namespace ivis {
 
-/// Guards of the map that tests take out one by one to prove that the verifier has power. All on in use.
+/// Guards of the map that tests take out one by one to prove that the verifier has power. All on in
+/// use.
 struct OcclusionGuards {
-  bool pixel_margin = true;     ///< draw a piece at the margin that covers a pixel at its far side, not at the least
-  bool sheet_obliqueness = true;  ///< take a sheet's radius for the worst line of sight, not for a perpendicular one
-
+  bool pixel_margin =
+      true;  ///< draw a piece at the margin that covers a pixel at its far side, not at the least
+  bool sheet_obliqueness =
+      true;  ///< take a sheet's radius for the worst line of sight, not for a perpendicular one
 };
 
-/// The perspective occlusion map: shrunk occluders of every kind drawn into six maps of depth about the eye; what lies
-/// behind in all of them is hidden. Any scene, any direction of view.
-/// Guarantee: conservative: an object seen from anywhere in the cell is never left out.
-/// Errors:    kInvalidArgument if the cell's reach is larger than the occluders were shrunk for.
-/// Threads:   solve() is const and reentrant; the result does not depend on options.threads.
-/// Cost:      O(visible hierarchy nodes + pixels of the occluders that show); bench/occlusion_map_bench.cpp.
-/// Source:    Wonka, Wimmer, Sillion, Instant Visibility, 2001, section 5.2; pixel margin and sheets: docs/theory.md, 3, 9.
-/// Departs:   a cube instead of a widened frustum, so turning is free; each piece at the first margin of a ladder that
-///            covers a pixel at its far side; sheets, which the paper's volumetric shrinking has no place for.
+/// The perspective occlusion map: shrunk occluders of every kind drawn into six maps of depth about
+/// the eye; what lies behind in all of them is hidden. Any scene, any direction of view. Guarantee:
+/// conservative: an object seen from anywhere in the cell is never left out. Errors:
+/// kInvalidArgument if the cell's reach is larger than the occluders were shrunk for. Threads:
+/// solve() is const and reentrant; the result does not depend on options.threads. Cost: O(visible
+/// hierarchy nodes + pixels of the occluders that show); bench/occlusion_map_bench.cpp. Source:
+/// Wonka, Wimmer, Sillion, Instant Visibility, 2001, section 5.2; pixel margin and sheets:
+/// docs/theory.md, 3, 9. Departs:   a cube instead of a widened frustum, so turning is free; each
+/// piece at the first margin of a ladder that
+///            covers a pixel at its far side; sheets, which the paper's volumetric shrinking has no
+///            place for.
 class OcclusionMap : public Method {
  public:
   using Stats = DepthStats;
 
-  OcclusionMap(const Scene& scene, const OccluderSet& occluders, const MethodOptions& options, const OcclusionGuards& guards = {});
+  OcclusionMap(const Scene& scene, const OccluderSet& occluders, const MethodOptions& options,
+               const OcclusionGuards& guards = {});
   ~OcclusionMap() override;
   const MethodTraits& traits() const override;
   Result<Pvs> solve(const ViewCell& cell) const override;
@@ -45,7 +50,8 @@ class OcclusionMap : public Method {
   struct Cell;
 
   void draw(const Cell& cell, Scratch& scratch, Stats& stats) const;
-  void draw_piece(const OccluderPieces::Piece& piece, std::uint32_t sides, const Cell& cell, Scratch& scratch, Stats& stats) const;
+  void draw_piece(const OccluderPieces::Piece& piece, std::uint32_t sides, const Cell& cell,
+                  Scratch& scratch, Stats& stats) const;
   std::vector<std::uint32_t> largest_pieces(const Cell& cell) const;
   void find(const Cell& cell, Scratch& scratch, Stats& stats) const;
   std::unique_ptr<Scratch> take_scratch() const;
