@@ -191,13 +191,6 @@ Reach read_reach(Reader& in) {
   return reach;
 }
 
-std::string hex(std::uint64_t v) {
-  std::string s(16, '0');
-  for (int i = 15; i >= 0; --i, v >>= 4U)
-    s[static_cast<std::size_t>(i)] = "0123456789abcdef"[v & 15U];
-  return s;
-}
-
 }  // namespace
 
 std::string encode_occluders(const OccluderSet& set) {
@@ -249,8 +242,8 @@ Result<OccluderSet> decode_occluders(std::span<const std::byte> bytes, const std
                        std::to_string(size));
   const std::uint64_t expected = header.u64("checksum");
   if (const std::uint64_t found = checksum(data, bytes.size()); found != expected)
-    return input_error(name + ": checksum: found " + hex(found) + ", expected " + hex(expected) +
-                       ": the file is damaged");
+    return input_error(name + ": checksum: found " + to_hex(found) + ", expected " +
+                       to_hex(expected) + ": the file is damaged");
 
   Reader in(data + kHeaderBytes, bytes.size() - kHeaderBytes, name);
   OccluderSet set;
@@ -290,8 +283,8 @@ Result<OccluderSet> read_occluders(const std::filesystem::path& file) {
 Status check_occluders(const OccluderSet& set, SceneHash scene_hash, const Reach& reach,
                        const std::string& name) {
   if (set.scene_hash != scene_hash)
-    return mismatch(name + ": made for the scene with hash " + hex(set.scene_hash) +
-                    ", this scene's is " + hex(scene_hash));
+    return mismatch(name + ": made for the scene with hash " + to_hex(set.scene_hash) +
+                    ", this scene's is " + to_hex(scene_hash));
   // As a solve asks it: both with their tolerances.
   if (!padded(set.reach, set.slack_m).contains(padded(reach, set.slack_m)))
     return mismatch(name + ": shrunk for the reach " + set.reach.to_string() +

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
 #define XXH_INLINE_ALL
@@ -12,12 +11,6 @@
 
 namespace ivis::server {
 namespace {
-
-std::string hex(std::uint64_t v) {
-  char text[20];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(v));
-  return text;
-}
 
 bool finite(const Vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -86,8 +79,8 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
                                                   std::to_string(wire::kProtocolVersion));
   if (hello.scene_hash != 0 && hello.scene_hash != scene_.hash)
     return turn_away(wire::Refusal::kScene, "the client's scene has the hash " +
-                                                hex(hello.scene_hash) + ", the server's " +
-                                                hex(scene_.hash));
+                                                to_hex(hello.scene_hash) + ", the server's " +
+                                                to_hex(scene_.hash));
   Session session;
   session.reach = reach_;
   if (!hello.reach.empty()) {

@@ -7,7 +7,6 @@
 #include <csignal>
 #include <cstdio>
 #include <ctime>
-#include <iomanip>
 #include <iostream>
 #include <sstream>
 
@@ -73,11 +72,6 @@ CLI::Validator number_within(double least, double most) {
 
 void print(const Json& json) { std::cout << json.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n'; }
 
-std::string hex(SceneHash hash) {
-  std::ostringstream out;
-  out << std::hex << std::setw(16) << std::setfill('0') << hash;
-  return out.str();
-}
 Json to_json(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
 
 Result<Vec3> parse_point(const std::string& text) {

@@ -37,7 +37,6 @@ Context make_context(bool quiet);
 
 void print(const Json& json);
 Json to_json(const Vec3& v);
-std::string hex(SceneHash hash);
 
 /// "X,Y,Z" -> Vec3; CLI11 validator and converter.
 Result<Vec3> parse_point(const std::string& text);

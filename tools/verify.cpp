@@ -102,8 +102,9 @@ Outcome verify_record(const Args& args, const Context& context) {
   const auto scene = args.scene.load(context);
   if (!scene) return scene.error();
   if (scene->hash != record->scene_hash)
-    return mismatch("'" + args.record.string() + "' was recorded with scene " + hex(record->scene_hash) + ", '" +
-                    args.scene.file.string() + "' is " + hex(scene->hash));
+    return mismatch("'" + args.record.string() + "' was recorded with scene " +
+                    to_hex(record->scene_hash) + ", '" + args.scene.file.string() + "' is " +
+                    to_hex(scene->hash));
   if (scene->objects.size() != record->objects)
     return input_error("'" + args.record.string() + "' is of " + std::to_string(record->objects) + " objects, the scene has " +
                        std::to_string(scene->objects.size()));
