@@ -8,7 +8,6 @@
 #include <xxhash.h>
 
 #include "core/path.h"
-#include "core/view_cell.h"
 
 namespace ivis {
 namespace {
@@ -285,8 +284,7 @@ Status check_occluders(const OccluderSet& set, SceneHash scene_hash, const Reach
   if (set.scene_hash != scene_hash)
     return mismatch(name + ": made for the scene with hash " + to_hex(set.scene_hash) +
                     ", this scene's is " + to_hex(scene_hash));
-  // As a solve asks it: both with their tolerances.
-  if (!padded(set.reach, set.slack_m).contains(padded(reach, set.slack_m)))
+  if (!serves(set, reach))
     return mismatch(name + ": shrunk for the reach " + set.reach.to_string() +
                     ", which does not contain " + reach.to_string());
   return ok();

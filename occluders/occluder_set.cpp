@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "core/view_cell.h"
+
 namespace ivis {
 
 double area(const Polygon& polygon) {
@@ -35,6 +37,10 @@ Aabb Prism::bounds() const {
       box.add(Vec3{p.x, top, p.y});
     }
   return box;
+}
+
+bool serves(const OccluderSet& set, const Reach& reach) {
+  return serves(set.reach, set.slack_m, reach);
 }
 
 // A point Z under the prism and within its footprint, on a sight line QY. By the floor rule Q and Y lie

@@ -66,6 +66,9 @@ struct OccluderSet {
   double floor = 0;
 };
 
+/// May a cell have this reach? Asked by whoever takes a reach from outside, and by each solve.
+bool serves(const OccluderSet& set, const Reach& reach);
+
 /// May the shrunk prism be taken as reaching down without end, for every viewpoint of a cell that
 /// spans `cell` (bounding box of eye + reach)? docs/theory.md, section 4, "downward extension".
 bool extends_down(const OccluderSet& set, const Prism& prism, const Aabb& cell);

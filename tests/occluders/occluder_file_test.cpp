@@ -201,6 +201,18 @@ TEST(OccluderFile, OnlyServesItsOwnSceneAndReachesItContains) {
   EXPECT_THAT(larger.error().message, HasSubstr("cylinder:1.6,0.1"));
 }
 
+TEST(OccluderFile, ServesAReachByTheSlackOfItsOwnSet) {
+  // Padding scales an ellipsoid up as a whole: with much slack it outgrows the cylinder.
+  OccluderSet set = example();
+  set.reach = Reach::cylinder(1, 0.5);
+  const Reach wanted = Reach::ellipsoid({0.95, 0.4, 0.95});
+  for (const double slack_m : {0.001, 0.05}) {
+    set.slack_m = slack_m;
+    EXPECT_EQ(serves(set, wanted), slack_m < 0.01);
+    EXPECT_EQ(check_occluders(set, set.scene_hash, wanted, "f").has_value(), slack_m < 0.01);
+  }
+}
+
 TEST(OccluderFile, IsWrittenAndReadWholeAndAMissingOneIsNamed) {
   const auto file = std::filesystem::temp_directory_path() /
                     ("ivis_occluder_file_test_" + std::to_string(::getpid()) + ".ivo");
