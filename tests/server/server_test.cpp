@@ -133,7 +133,7 @@ class Address : public ServerSocket {
  protected:
   std::string path = ::testing::TempDir() + "ivis_address_" + std::to_string(getpid()) + ".sock";
   std::string ipc = "ipc://" + path;
-  server::ServedScene served = server::served_scene(scene);
+  server::ServedScene served = server::served_scene(scene, {});
   server::Log log{server::LogLevel::kOff, false};
   void TearDown() override { std::filesystem::remove(path); }
 
