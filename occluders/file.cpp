@@ -85,8 +85,7 @@ class Reader {
   double f64(const char* field) {
     const double v = std::bit_cast<double>(integer(8, field));
     if (!std::isfinite(v)) fail(field, "a number that is not finite", "a finite one");
-    // Beyond any scene; what is in range stays so in single precision, and so do its products.
-    if (std::abs(v) > 1e9) fail(field, std::to_string(v), "at most 1e9");
+    if (!in_range(v)) fail(field, std::to_string(v), "at most 1e9");
     return failed() ? 0 : v;
   }
   Vec3 vec(const char* field) {
@@ -109,8 +108,6 @@ class Reader {
       p.bottom = f64("prism bottom");
       p.top = f64("prism top");
       p.solid_bottom = f64("prism solid bottom");
-      if (p.bottom > p.top)
-        fail("prism top", std::to_string(p.top), "at least its bottom " + std::to_string(p.bottom));
       p.grounded = u8("prism grounded", 1) != 0;
       p.footprint.rings.resize(count("rings of a prism", 4, 1, kMinRingBytes));
       for (auto& ring : p.footprint.rings) {
@@ -249,7 +246,6 @@ Result<OccluderSet> decode_occluders(std::span<const std::byte> bytes, const std
   set.scene_hash = in.u64("scene hash");
   set.reach = read_reach(in);
   set.slack_m = in.f64("slack");
-  if (set.slack_m < 0) in.fail("slack", std::to_string(set.slack_m), "at least 0");
   set.floor = in.f64("floor");
   const bool has_ground = in.u8("ground", 1) != 0;
   const Vec3 lo = in.vec("ground");
@@ -266,6 +262,8 @@ Result<OccluderSet> decode_occluders(std::span<const std::byte> bytes, const std
   set.solids = in.prisms("solids");
   if (!in.failed()) in.end();
   if (in.failed()) return input_error(in.error());
+  if (auto sound = check_numbers(set); !sound)
+    return input_error(name + ": " + sound.error().message);
   return set;
 }
 

@@ -1,6 +1,7 @@
 #include "occluders/occluder_set.h"
 
 #include <cmath>
+#include <string>
 
 #include "core/view_cell.h"
 
@@ -37,6 +38,51 @@ Aabb Prism::bounds() const {
       box.add(Vec3{p.x, top, p.y});
     }
   return box;
+}
+
+namespace {
+
+std::string check_prism(const Prism& p) {
+  const auto outside = [](const char* field, double v) {
+    return std::string(field) + ": found " + std::to_string(v) + ", expected at most 1e9";
+  };
+  if (!in_range(p.bottom)) return outside("bottom", p.bottom);
+  if (!in_range(p.top)) return outside("top", p.top);
+  if (!in_range(p.solid_bottom)) return outside("solid bottom", p.solid_bottom);
+  if (p.bottom > p.top)
+    return "top: found " + std::to_string(p.top) + ", expected at least its bottom " +
+           std::to_string(p.bottom);
+  for (const auto& ring : p.footprint.rings)
+    for (const Vec2& corner : ring) {
+      if (!in_range(corner.x)) return outside("corner x", corner.x);
+      if (!in_range(corner.y)) return outside("corner z", corner.y);
+    }
+  return "";
+}
+
+}  // namespace
+
+Status check_numbers(const OccluderSet& set) {
+  const auto wrong = [](const std::string& field, double found, const char* expected) {
+    return invalid_argument("occluders: " + field + ": found " + std::to_string(found) +
+                            ", expected " + expected);
+  };
+  for (int i = 0; i < 3; ++i)
+    if (const double e = set.reach.half_extents()[i]; !(e >= 0 && in_range(e)))
+      return wrong("reach half-extent", e, "0 to 1e9");
+  if (!(set.slack_m >= 0 && in_range(set.slack_m))) return wrong("slack", set.slack_m, "0 to 1e9");
+  if (!in_range(set.floor)) return wrong("floor", set.floor, "at most 1e9");
+  if (!set.ground.empty())
+    for (int i = 0; i < 3; ++i)
+      for (const double v : {set.ground.lo[i], set.ground.hi[i]})
+        if (!in_range(v)) return wrong("ground", v, "at most 1e9");
+  for (const auto* prisms : {&set.shrunk, &set.solids})
+    for (std::size_t i = 0; i < prisms->size(); ++i)
+      if (const std::string why = check_prism((*prisms)[i]); !why.empty())
+        return invalid_argument(
+            "occluders: " + std::string(prisms == &set.shrunk ? "shrunk prism " : "solid ") +
+            std::to_string(i) + ": " + why);
+  return ok();
 }
 
 bool serves(const OccluderSet& set, const Reach& reach) {

@@ -1,6 +1,7 @@
 #pragma once
 // The value that travels from occluders/ to visibility/: shrunk solids. Light: no builder, no CGAL.
 
+#include <cmath>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "core/ids.h"
 #include "core/math.h"
 #include "core/reach.h"
+#include "core/result.h"
 
 namespace ivis {
 
@@ -65,6 +67,17 @@ struct OccluderSet {
   /// without end for cells that lie nowhere below solid_bottom: no sight line passes under it.
   double floor = 0;
 };
+
+/// Beyond any scene; what is in range stays so in single precision, and so do its products.
+inline constexpr double kMaxNumber = 1e9;
+inline bool in_range(double v) {
+  return std::abs(v) <= kMaxNumber;
+}  // NaN is not
+
+/// Can a method compute with the set: is every number in range, and no prism, ground or slack
+/// inside out? Asked of every set that comes from outside. Errors: kInvalidArgument, naming the
+/// number.
+Status check_numbers(const OccluderSet& set);
 
 /// May a cell have this reach? Asked by whoever takes a reach from outside, and by each solve.
 bool serves(const OccluderSet& set, const Reach& reach);

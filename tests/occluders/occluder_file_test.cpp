@@ -166,6 +166,7 @@ TEST(OccluderFile, RefusesValuesOutOfTheirRange) {
                  {kHasGround, 2, 1},
                  {kHasGround + 1, infinity, 8},
                  {kFirstPrism, nan, 8},
+                 {kFirstPrism, std::bit_cast<std::uint64_t>(2e9), 8},
                  {kFirstPrism, std::bit_cast<std::uint64_t>(9.0), 8},
                  {kFirstPrism + 24, 2, 1},
                  {kRingCount, 0, 4},
