@@ -1,7 +1,9 @@
 #include "client_lib/local_source.h"
 
 #include <condition_variable>
+#include <exception>
 #include <mutex>
+#include <new>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -78,7 +80,28 @@ class LocalSource : public PvsSource {
   }
 
   /// Fills `answer` for its cell. What cannot be solved is answered with every object; returns why.
-  std::string solve(Answer& answer) const {
+  /// An exception would end the host's process: nobody stands above this thread to catch it.
+  std::string solve(Answer& answer) const noexcept {
+    std::string why = "out of memory";
+    try {
+      return solve_or_throw(answer);
+    } catch (const std::bad_alloc&) {
+    } catch (const std::exception& e) {
+      try {
+        why = std::string("the method failed: ") + e.what();
+      } catch (const std::bad_alloc&) {  // then that is the trouble
+      }
+    } catch (...) {
+      why = "unknown error";
+    }
+    answer.everything = true;
+    answer.bits.clear();
+    answer.count = world_.catalogue.objects();
+    answer.solve_ms = 0;
+    return why;
+  }
+
+  std::string solve_or_throw(Answer& answer) const {
     const auto start = std::chrono::steady_clock::now();
     const auto pvs = world_.method->solve(answer.cell);
     const auto took = std::chrono::steady_clock::now() - start;

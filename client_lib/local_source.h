@@ -17,8 +17,9 @@ struct LocalWorld {
 Catalogue catalogue_of(const Scene& scene, const Reach& reach, const Method& method);
 
 /// Answers from a worker thread with one slot for the latest pose and one for the latest answer.
-/// Threads: as PvsSource; the worker is its own. Neither side waits for a solve to put or take a
-/// slot.
+/// A pose that the method cannot solve, or that it throws at (out of memory), is answered with
+/// every object, and trouble() says why until a later one succeeds. Threads: as PvsSource; the
+/// worker is its own. Neither side waits for a solve to put or take a slot.
 std::unique_ptr<PvsSource> make_local_source(LocalWorld world);
 
 }  // namespace ivis::client

@@ -25,14 +25,6 @@ constexpr auto kSendAgain = std::chrono::milliseconds(2);
 constexpr auto kTimers = std::chrono::milliseconds(50);
 constexpr std::size_t kRememberedEyes = 1024;
 
-std::string hex(std::uint64_t v) {
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  std::string text;
-  for (int shift = 60; shift >= 0; shift -= 4)
-    text += kDigits[(v >> static_cast<unsigned>(shift)) & 15U];
-  return text;
-}
-
 }  // namespace
 
 struct NetworkSource::Impl {
@@ -153,8 +145,8 @@ struct NetworkSource::Impl {
       return fail(mismatch("the server speaks version " + std::to_string(w.version) +
                            ", the client " + std::to_string(wire::kProtocolVersion)));
     if (scene_hash != 0 && w.scene_hash != scene_hash)
-      return fail(mismatch("the client's scene has the hash " + hex(scene_hash) +
-                           ", the server's " + hex(w.scene_hash)));
+      return fail(mismatch("the client's scene has the hash " + to_hex(scene_hash) +
+                           ", the server's " + to_hex(w.scene_hash)));
     auto reach_served = Reach::parse(w.reach);
     if (w.session == 0 || !reach_served || w.table.id.size() != w.objects ||
         w.table.node.size() != w.objects || w.table.instance.size() != w.objects) {
@@ -178,8 +170,8 @@ struct NetworkSource::Impl {
       return;
     }
     if (catalogue && (told.node != catalogue->node || told.instance != catalogue->instance))
-      return fail(
-          mismatch("the server's objects have changed under the scene hash " + hex(w.scene_hash)));
+      return fail(mismatch("the server's objects have changed under the scene hash " +
+                           to_hex(w.scene_hash)));
     if (catalogue && was_lost) ++counted.reconnects;
     catalogue = std::move(told);
     id_of = std::move(w.table.id);

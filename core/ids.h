@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 namespace ivis {
 
@@ -10,5 +11,13 @@ using ObjectId = std::uint32_t;
 using Rank = std::uint32_t;
 /// Content hash of a scene; rides through every value, so that two ends with different scenes say so.
 using SceneHash = std::uint64_t;
+
+/// As hashes are shown to people: sixteen digits, lower case.
+inline std::string to_hex(SceneHash hash) {
+  std::string text(16, '0');
+  for (auto digit = text.rbegin(); digit != text.rend(); ++digit, hash >>= 4U)
+    *digit = "0123456789abcdef"[hash & 15U];
+  return text;
+}
 
 }  // namespace ivis

@@ -137,7 +137,6 @@ Reach Reach::grown(double horizontal, double vertical) const {
   const Vec3 g{e_.x + horizontal, e_.y + vertical, e_.z + horizontal};
   switch (kind_) {
     case Kind::kBall:
-      return {Kind::kCylinder, g};
     case Kind::kDisc:
     case Kind::kCylinder: return {Kind::kCylinder, g};
     case Kind::kBox: return {Kind::kBox, g};

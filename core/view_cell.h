@@ -19,6 +19,12 @@ inline Reach padded(const Reach& r, double slack_m) {
   return r.grown(kReachToleranceM + slack_m, vertical_tolerance(r) + slack_m);
 }
 
+/// May a cell have the reach `wanted` where occluders were shrunk for `shrunk_for` with `slack_m`?
+/// The one comparison of reaches: of what both are padded to, as that is what an answer promises.
+inline bool serves(const Reach& shrunk_for, double slack_m, const Reach& wanted) {
+  return padded(shrunk_for, slack_m).contains(padded(wanted, slack_m));
+}
+
 /// Every viewpoint that one visibility solution must serve: eye + reach.
 struct ViewCell {
   Vec3 eye{0};

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "occluders/box_tree.h"
+#include "occluders/rect_tree.h"
 
 namespace ivis {
 namespace {
@@ -36,7 +36,7 @@ class EdgeTree {
     boxes.reserve(edges_.size());
     for (const Edge& e : edges_)
       boxes.push_back(box_of(e));
-    tree_ = BoxTree(boxes);
+    tree_ = RectTree(boxes);
   }
   const std::vector<Edge>& edges() const { return edges_; }
   /// Does `accept` hold for every edge that may meet `box`?
@@ -47,7 +47,7 @@ class EdgeTree {
 
  private:
   std::vector<Edge> edges_;
-  BoxTree tree_;
+  RectTree tree_;
 };
 
 /// Even-odd, by crossings to the right. Right for points well away from the edges.

@@ -8,7 +8,6 @@
 #include <xxhash.h>
 
 #include "core/path.h"
-#include "core/view_cell.h"
 
 namespace ivis {
 namespace {
@@ -117,8 +116,7 @@ class Reader {
   double f64(const char* field) {
     const double v = std::bit_cast<double>(integer(8, field));
     if (!std::isfinite(v)) fail(field, "a number that is not finite", "a finite one");
-    // Beyond any scene; what is in range stays so in single precision, and so do its products.
-    if (std::abs(v) > 1e9) fail(field, std::to_string(v), "at most 1e9");
+    if (!in_range(v)) fail(field, std::to_string(v), "at most 1e9");
     return failed() ? 0 : v;
   }
   Vec3 vec(const char* field) {
@@ -141,8 +139,6 @@ class Reader {
       p.bottom = f64("prism bottom");
       p.top = f64("prism top");
       p.solid_bottom = f64("prism solid bottom");
-      if (p.bottom > p.top)
-        fail("prism top", std::to_string(p.top), "at least its bottom " + std::to_string(p.bottom));
       p.grounded = u8("prism grounded", 1) != 0;
       p.footprint.rings.resize(count("rings of a prism", 4, 1, kMinRingBytes));
       for (auto& ring : p.footprint.rings) {
@@ -306,13 +302,6 @@ Reach read_reach(Reader& in) {
   return reach;
 }
 
-std::string hex(std::uint64_t v) {
-  std::string s(16, '0');
-  for (int i = 15; i >= 0; --i, v >>= 4U)
-    s[static_cast<std::size_t>(i)] = "0123456789abcdef"[v & 15U];
-  return s;
-}
-
 }  // namespace
 
 std::string encode_occluders(const OccluderSet& set) {
@@ -400,15 +389,14 @@ Result<OccluderSet> decode_occluders(std::span<const std::byte> bytes, const std
                        std::to_string(size));
   const std::uint64_t expected = header.u64("checksum");
   if (const std::uint64_t found = checksum(data, bytes.size()); found != expected)
-    return input_error(name + ": checksum: found " + hex(found) + ", expected " + hex(expected) +
-                       ": the file is damaged");
+    return input_error(name + ": checksum: found " + to_hex(found) + ", expected " +
+                       to_hex(expected) + ": the file is damaged");
 
   Reader in(data + kHeaderBytes, bytes.size() - kHeaderBytes, name);
   OccluderSet set;
   set.scene_hash = in.u64("scene hash");
   set.reach = read_reach(in);
   set.slack_m = in.f64("slack");
-  if (set.slack_m < 0) in.fail("slack", std::to_string(set.slack_m), "at least 0");
   set.floor = in.f64("floor");
   const bool has_ground = in.u8("ground", 1) != 0;
   const Vec3 lo = in.vec("ground");
@@ -463,6 +451,8 @@ Result<OccluderSet> decode_occluders(std::span<const std::byte> bytes, const std
   set.sealed = in.u8("sealed", 1) != 0;
   if (!in.failed()) in.end();
   if (in.failed()) return input_error(in.error());
+  if (auto sound = check_numbers(set); !sound)
+    return input_error(name + ": " + sound.error().message);
   return set;
 }
 
@@ -479,10 +469,9 @@ Result<OccluderSet> read_occluders(const std::filesystem::path& file) {
 Status check_occluders(const OccluderSet& set, SceneHash scene_hash, const Reach& reach,
                        const std::string& name) {
   if (set.scene_hash != scene_hash)
-    return mismatch(name + ": made for the scene with hash " + hex(set.scene_hash) +
-                    ", this scene's is " + hex(scene_hash));
-  // As a solve asks it: both with their tolerances.
-  if (!padded(set.reach, set.slack_m).contains(padded(reach, set.slack_m)))
+    return mismatch(name + ": made for the scene with hash " + to_hex(set.scene_hash) +
+                    ", this scene's is " + to_hex(scene_hash));
+  if (!serves(set, reach))
     return mismatch(name + ": shrunk for the reach " + set.reach.to_string() +
                     ", which does not contain " + reach.to_string());
   return ok();

@@ -336,7 +336,7 @@ class Outline {
           box.add(p);
         boxes.push_back(box);
       }
-    tree_ = BoxTree(boxes);
+    tree_ = RectTree(boxes);
   }
   bool meets(const Low& low) const {
     const bool apart = tree_.all(
@@ -358,7 +358,7 @@ class Outline {
     return inside;
   }
   std::vector<std::array<Vec2, 2>> edges_;
-  BoxTree tree_;
+  RectTree tree_;
 };
 
 }  // namespace
@@ -376,7 +376,7 @@ Ground::Ground(std::vector<Vec3> corners, std::vector<Corners> triangles,
     }
     boxes.push_back(box);
   }
-  tree_ = BoxTree(boxes);
+  tree_ = RectTree(boxes);
 }
 
 // The ground dips below y over the footprint only where the low part of some triangle, a convex

@@ -9,8 +9,8 @@
 
 #include "core/aabb.h"
 #include "core/context.h"
-#include "occluders/box_tree.h"
 #include "occluders/occluder_set.h"
+#include "occluders/rect_tree.h"
 #include "scenes/scene.h"
 
 namespace ivis {
@@ -46,7 +46,7 @@ class Ground {
   std::vector<ObjectId> objects_;
   std::vector<Vec3> corners_;
   std::vector<std::array<std::uint32_t, 3>> triangles_;
-  BoxTree tree_;  // over triangles_, by their projections
+  RectTree tree_;  // over triangles_, by their projections
 };
 
 /// Finds the ground: of the drawn, opaque, not always-visible objects without steep triangles, the

@@ -1,6 +1,10 @@
 #include "occluders/occluder_set.h"
 
+#include <algorithm>
 #include <cmath>
+#include <string>
+
+#include "core/view_cell.h"
 
 namespace ivis {
 
@@ -36,6 +40,82 @@ Aabb Prism::bounds() const {
       box.add(Vec3{p.x, top, p.y});
     }
   return box;
+}
+
+namespace {
+
+std::string check_prism(const Prism& p) {
+  const auto outside = [](const char* field, double v) {
+    return std::string(field) + ": found " + std::to_string(v) + ", expected at most 1e9";
+  };
+  if (!in_range(p.bottom)) return outside("bottom", p.bottom);
+  if (!in_range(p.top)) return outside("top", p.top);
+  if (!in_range(p.solid_bottom)) return outside("solid bottom", p.solid_bottom);
+  if (p.bottom > p.top)
+    return "top: found " + std::to_string(p.top) + ", expected at least its bottom " +
+           std::to_string(p.bottom);
+  for (const auto& ring : p.footprint.rings)
+    for (const Vec2& corner : ring) {
+      if (!in_range(corner.x)) return outside("corner x", corner.x);
+      if (!in_range(corner.y)) return outside("corner z", corner.y);
+    }
+  return "";
+}
+
+}  // namespace
+
+Status check_numbers(const OccluderSet& set) {
+  const auto wrong = [](const std::string& field, double found, const char* expected) {
+    return invalid_argument("occluders: " + field + ": found " + std::to_string(found) +
+                            ", expected " + expected);
+  };
+  for (int i = 0; i < 3; ++i)
+    if (const double e = set.reach.half_extents()[i]; !(e >= 0 && in_range(e)))
+      return wrong("reach half-extent", e, "0 to 1e9");
+  if (!(set.slack_m >= 0 && in_range(set.slack_m))) return wrong("slack", set.slack_m, "0 to 1e9");
+  if (!in_range(set.floor)) return wrong("floor", set.floor, "at most 1e9");
+  if (!set.ground.empty())
+    for (int i = 0; i < 3; ++i)
+      for (const double v : {set.ground.lo[i], set.ground.hi[i]})
+        if (!in_range(v)) return wrong("ground", v, "at most 1e9");
+  for (const auto* prisms : {&set.shrunk, &set.solids})
+    for (std::size_t i = 0; i < prisms->size(); ++i)
+      if (const std::string why = check_prism((*prisms)[i]); !why.empty())
+        return invalid_argument(
+            "occluders: " + std::string(prisms == &set.shrunk ? "shrunk prism " : "solid ") +
+            std::to_string(i) + ": " + why);
+  for (const PrismPiece& piece : set.prism_pieces)
+    for (const auto& level : piece.levels)
+      for (const Prism& prism : level)
+        if (const std::string why = check_prism(prism); !why.empty())
+          return invalid_argument("occluders: prism of a piece: " + why);
+  const auto outside = [](const Vec3& p) {
+    return !in_range(p.x) || !in_range(p.y) || !in_range(p.z);
+  };
+  const auto bad_mesh = [&](const FaceMesh& mesh) {
+    return std::any_of(mesh.points.begin(), mesh.points.end(), outside) ||
+           std::any_of(mesh.faces.begin(), mesh.faces.end(), [&](const auto& face) {
+             return std::any_of(face.begin(), face.end(),
+                                [&](std::uint32_t c) { return c >= mesh.points.size(); });
+           });
+  };
+  for (const SolidPiece& piece : set.solid_pieces)
+    if (piece.levels.size() > set.margins_m.size() ||
+        std::any_of(piece.levels.begin(), piece.levels.end(), bad_mesh))
+      return invalid_argument("occluders: a solid piece has a number out of range");
+  for (const PrismPiece& piece : set.prism_pieces)
+    if (piece.levels.size() > set.margins_m.size())
+      return invalid_argument("occluders: a prism piece has more levels than there are margins");
+  for (const Sheet& sheet : set.sheets)
+    if (outside(sheet.normal) || !in_range(sheet.offset) ||
+        sheet.levels.size() > set.sheet_radii_m.size() ||
+        std::any_of(sheet.levels.begin(), sheet.levels.end(), bad_mesh))
+      return invalid_argument("occluders: a sheet has a number out of range");
+  return ok();
+}
+
+bool serves(const OccluderSet& set, const Reach& reach) {
+  return serves(set.reach, set.slack_m, reach);
 }
 
 // A point Z under the prism and within its footprint, on a sight line QY. By the floor rule Q and Y

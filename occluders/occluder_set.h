@@ -2,6 +2,7 @@
 // The value that travels from occluders/ to visibility/: shrunk solids. Light: no builder, no CGAL.
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -11,6 +12,7 @@
 #include "core/ids.h"
 #include "core/math.h"
 #include "core/reach.h"
+#include "core/result.h"
 
 namespace ivis {
 
@@ -137,6 +139,20 @@ struct OccluderSet {
   /// Openings were taken for closed because somebody said so: the guarantee does not hold.
   bool sealed = false;
 };
+
+/// Beyond any scene; what is in range stays so in single precision, and so do its products.
+inline constexpr double kMaxNumber = 1e9;
+inline bool in_range(double v) {
+  return std::abs(v) <= kMaxNumber;
+}  // NaN is not
+
+/// Can a method compute with the set: is every number in range, and no prism, ground or slack
+/// inside out? Asked of every set that comes from outside. Errors: kInvalidArgument, naming the
+/// number.
+Status check_numbers(const OccluderSet& set);
+
+/// May a cell have this reach? Asked by whoever takes a reach from outside, and by each solve.
+bool serves(const OccluderSet& set, const Reach& reach);
 
 /// May the shrunk prism be taken as reaching down without end, for every viewpoint of a cell that
 /// spans `cell` (bounding box of eye + reach)? docs/theory.md, section 4, "downward extension".

@@ -149,7 +149,7 @@ bool build_perimeter(BuiltBlock& block, double out, double frontage_m, const Hei
 
     const double free = s.to - s.from;
     if (free <= 0) continue;
-    const auto houses = std::max<std::size_t>(1, static_cast<std::size_t>(free / frontage_m + 0.5));
+    const auto houses = static_cast<std::size_t>(std::max(1LL, std::llround(free / frontage_m)));
     std::vector<double> cut{s.from};
     for (std::size_t k = 1; k < houses; ++k)
       cut.push_back(s.from + free * (static_cast<double>(k) + random.in(-0.22, 0.22)) /

@@ -44,7 +44,7 @@ Result<Mat4> local_transform(const tinygltf::Node& node) {
     Mat4 m(1);
     for (int c = 0; c < 4; ++c)
       for (int r = 0; r < 4; ++r)
-        m[c][r] = node.matrix[static_cast<std::size_t>(4 * c + r)];
+        m[c][r] = node.matrix[4 * static_cast<std::size_t>(c) + static_cast<std::size_t>(r)];
     if (m[0][3] != 0 || m[1][3] != 0 || m[2][3] != 0 || m[3][3] != 1)
       return input_error("the last row of its matrix is not 0 0 0 1");
     return m;

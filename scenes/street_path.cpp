@@ -30,7 +30,9 @@ class FreeGrid {
   bool free(std::size_t cell) const { return free_[cell] != 0; }
   void close(std::size_t cell) { free_[cell] = 0; }
   Vec2 centre(std::size_t cell) const {
-    return lo_ + Vec2(static_cast<double>(cell % nx_) + 0.5, static_cast<double>(cell / nx_) + 0.5);
+    const std::size_t row = cell / nx_;
+    const std::size_t column = cell % nx_;
+    return lo_ + Vec2(static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5);
   }
   bool free_at(const Vec2& p) const {
     const Vec2 q = glm::floor(p - lo_);

@@ -75,4 +75,13 @@ Status claim_address(const std::string& endpoint) {
   return ok();
 }
 
+std::string plain_endpoint(std::string endpoint) {
+  constexpr std::string_view kMapped = "tcp://[::ffff:";
+  if (!endpoint.starts_with(kMapped)) return endpoint;
+  const auto end = endpoint.find(']');
+  if (end == std::string::npos) return endpoint;
+  return std::string(kTcp) + endpoint.substr(kMapped.size(), end - kMapped.size()) +
+         endpoint.substr(end + 1);
+}
+
 }  // namespace ivis::server

@@ -13,4 +13,8 @@ namespace ivis::server {
 /// two servers that start within the same instant on one ipc path are not told apart.
 Status claim_address(const std::string& endpoint);
 
+/// The endpoint as a person writes it: an IPv4 address that a socket of IPv6 shows as
+/// [::ffff:127.0.0.1] is 127.0.0.1, which is also how clients reach it.
+std::string plain_endpoint(std::string endpoint);
+
 }  // namespace ivis::server

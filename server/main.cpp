@@ -152,11 +152,11 @@ int serve(const Config& config) {
                       {"reach", w.reach.to_string()},
                       {"method", w.method->traits().name}});
 
-  const ServedScene served = served_scene(w.scene);
-  if (served.objects() > wire::kMaxMessageBytes / 12)
+  if (w.scene.object_count() > wire::kMaxObjects)
     return report(input_error("'" + config.scene.string() + "' has " +
-                              std::to_string(served.objects()) +
+                              std::to_string(w.scene.object_count()) +
                               " objects, more than a message can name"));
+  const ServedScene served = served_scene(w.scene, w.occluders);
   ServerOptions options;
   options.listen = config.listen;
   options.busy_poll = config.busy_poll;

@@ -158,7 +158,7 @@ Result<std::unique_ptr<Server>> Server::bind(const ServerOptions& options, const
     auto impl = std::make_unique<Impl>(options, scene, method, reach, log);
     impl->configure();
     impl->socket.bind(options.listen);
-    impl->endpoint = impl->socket.get(zmq::sockopt::last_endpoint);
+    impl->endpoint = plain_endpoint(impl->socket.get(zmq::sockopt::last_endpoint));
     impl->held = true;
     return std::unique_ptr<Server>(new Server(std::move(impl)));
   } catch (const zmq::error_t& e) {

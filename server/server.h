@@ -35,7 +35,7 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// As bound: the port in place of '*'.
+  /// As bound: the port in place of '*'; plain_endpoint().
   const std::string& endpoint() const;
   /// Serves until `stop` is set (looked at ten times a second and after every signal), then bids
   /// every client farewell, sends what is queued, and gives the address back.

@@ -2,22 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
 #include "core/view_cell.h"
+#include "wire/object_table.h"
 
 namespace ivis::server {
 namespace {
-
-std::string hex(std::uint64_t v) {
-  char text[20];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(v));
-  return text;
-}
 
 bool finite(const Vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -32,19 +26,21 @@ std::mt19937_64 seeded() {
 
 }  // namespace
 
-ServedScene served_scene(const Scene& scene) {
+ServedScene served_scene(const Scene& scene, const OccluderSet& occluders) {
   ServedScene served;
   served.hash = scene.hash;
-  served.table.id = rank_order(scene);
-  served.order_hash =
-      XXH3_64bits(served.table.id.data(), served.table.id.size() * sizeof(ObjectId));
+  served.slack_m = occluders.slack_m;
+  wire::ObjectTable table;
+  table.id = rank_order(scene);
+  served.order_hash = XXH3_64bits(table.id.data(), table.id.size() * sizeof(ObjectId));
   served.rank_of.resize(scene.object_count());
-  for (Rank r = 0; r < served.table.id.size(); ++r) {
-    const Object& o = scene.objects[served.table.id[r]];
-    served.table.node.push_back(o.node);
-    served.table.instance.push_back(o.instance);
-    served.rank_of[served.table.id[r]] = r;
+  for (Rank r = 0; r < table.id.size(); ++r) {
+    const Object& o = scene.objects[table.id[r]];
+    table.node.push_back(o.node);
+    table.instance.push_back(o.instance);
+    served.rank_of[table.id[r]] = r;
   }
+  served.packed_table = wire::pack_table(table);
   return served;
 }
 
@@ -86,15 +82,14 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
                                                   std::to_string(wire::kProtocolVersion));
   if (hello.scene_hash != 0 && hello.scene_hash != scene_.hash)
     return turn_away(wire::Refusal::kScene, "the client's scene has the hash " +
-                                                hex(hello.scene_hash) + ", the server's " +
-                                                hex(scene_.hash));
+                                                to_hex(hello.scene_hash) + ", the server's " +
+                                                to_hex(scene_.hash));
   Session session;
   session.reach = reach_;
   if (!hello.reach.empty()) {
     const auto wanted = Reach::parse(hello.reach);
     if (!wanted) return turn_away(wire::Refusal::kReach, wanted.error().message);
-    constexpr double kSlackM = 0.001;  // a solve compares both with their tolerances
-    if (!padded(reach_, kSlackM).contains(padded(*wanted, kSlackM)))
+    if (!serves(reach_, scene_.slack_m, *wanted))
       return turn_away(wire::Refusal::kReach, "the client wants " + wanted->to_string() +
                                                   ", the server's occluders serve up to " +
                                                   reach_.to_string());
@@ -188,8 +183,8 @@ std::vector<std::byte> SessionTable::welcome(Session& session) {
   w.objects = scene_.objects();
   w.reach = session.reach.to_string();
   w.method = method_.traits().name;
-  if (session.table_wanted) w.table = scene_.table;
-  return wire::encode(w);
+  if (!session.table_wanted) return wire::encode(w);
+  return wire::encode(w, scene_.packed_table);
 }
 
 std::vector<std::byte> SessionTable::answer(Session& session) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/reach.h"
+#include "occluders/occluder_set.h"
 #include "scenes/scene.h"
 #include "visibility/method.h"
 #include "wire/messages.h"
@@ -25,12 +26,14 @@ namespace ivis::server {
 struct ServedScene {
   SceneHash hash = 0;
   std::uint64_t order_hash = 0;
-  wire::ObjectTable table;    ///< by rank
+  std::vector<std::uint8_t>
+      packed_table;           ///< wire/object_table.h; goes into every Welcome as it is
   std::vector<Rank> rank_of;  ///< by id
+  double slack_m = 0;         ///< of the occluders: reaches are compared with it
   std::uint32_t objects() const { return static_cast<std::uint32_t>(rank_of.size()); }
 };
 
-ServedScene served_scene(const Scene& scene);
+ServedScene served_scene(const Scene& scene, const OccluderSet& occluders);
 
 struct SessionLimits {
   std::size_t max_sessions = 256;

@@ -18,15 +18,17 @@ Outcome info(const Args& args) {
     print({{"objects", scene->objects.size()},
            {"triangles", scene->triangle_count},
            {"bounds", Json::array({to_json(scene->bounds.lo), to_json(scene->bounds.hi)})},
-           {"hash", hex(scene->hash)},
+           {"hash", to_hex(scene->hash)},
            {"extensions", scene->extensions},
            {"warnings", scene->warnings}});
     return kOk;
   }
   const Vec3 size = scene->bounds.size();
-  std::cout << "objects     " << scene->objects.size() << "\ntriangles   " << scene->triangle_count << "\nonly-occluders " << scene->hidden_solids.size()
-            << "\nbounds      " << to_json(scene->bounds.lo).dump() << " .. " << to_json(scene->bounds.hi).dump() << "  (" << size.x << " x "
-            << size.y << " x " << size.z << " m)\nhash        " << hex(scene->hash) << "\nextensions ";
+  std::cout << "objects     " << scene->objects.size() << "\ntriangles   " << scene->triangle_count
+            << "\nonly-occluders " << scene->hidden_solids.size() << "\nbounds      "
+            << to_json(scene->bounds.lo).dump() << " .. " << to_json(scene->bounds.hi).dump()
+            << "  (" << size.x << " x " << size.y << " x " << size.z << " m)\nhash        "
+            << to_hex(scene->hash) << "\nextensions ";
   for (const auto& e : scene->extensions) std::cout << ' ' << e;
   std::cout << '\n';
   return kOk;

@@ -9,7 +9,7 @@ namespace ivis {
 Status check_cell(const ViewCell& cell, const OccluderSet& occluders) {
   if (!std::isfinite(cell.eye.x) || !std::isfinite(cell.eye.y) || !std::isfinite(cell.eye.z))
     return invalid_argument("the eye is not finite");
-  if (!padded(occluders.reach, occluders.slack_m).contains(padded(cell.reach, occluders.slack_m)))
+  if (!serves(occluders, cell.reach))
     return invalid_argument("reach " + cell.reach.to_string() +
                             " is larger than the occluders were shrunk for, " +
                             occluders.reach.to_string());

@@ -138,7 +138,7 @@ Result<Pvs> CullMap::solve(const ViewCell& cell) const {
 Result<Pvs> CullMap::solve(const ViewCell& cell, Stats& stats) const {
   if (!std::isfinite(cell.eye.x) || !std::isfinite(cell.eye.y) || !std::isfinite(cell.eye.z))
     return invalid_argument("the eye is not finite");
-  if (!padded(occluders_.reach, occluders_.slack_m).contains(padded(cell.reach, occluders_.slack_m)))
+  if (!serves(occluders_, cell.reach))
     return invalid_argument("reach " + cell.reach.to_string() + " is larger than the occluders were shrunk for, " +
                             occluders_.reach.to_string());
   Pvs pvs;

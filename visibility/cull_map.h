@@ -33,6 +33,10 @@ class CullMap : public Method {
           const PolarGuards& guards = {}, std::uint32_t bins_a_face = kBinsAFace);
   ~CullMap() override;
   const MethodTraits& traits() const override;
+  /// An eye inside an occluder gets everything, and the Pvs says so. An eye under the ground,
+  /// within OccluderSet::ground, gets a set that promises nothing, and nothing says so: of the
+  /// ground only the rectangle is known here, not the heights, and such viewpoints do not count
+  /// (docs/theory.md, 1).
   Result<Pvs> solve(const ViewCell& cell) const override;
   Result<Pvs> solve(const ViewCell& cell, Stats& stats) const;
 

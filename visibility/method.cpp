@@ -52,6 +52,7 @@ Result<std::unique_ptr<Method>> make_method(std::string_view name, const Scene& 
     if (e.traits.name == name) {
       if (e.traits.needs_occluders && occluders.scene_hash != scene.hash)
         return mismatch("the occluders belong to another scene than the one loaded");
+      if (auto sound = check_numbers(occluders); !sound) return sound.error();
       return e.make(scene, occluders, options);
     }
     known += (known.empty() ? "" : ", ") + e.traits.name;

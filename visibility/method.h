@@ -57,8 +57,8 @@ class Method {
 /// Traits of every registered method.
 std::vector<MethodTraits> method_list();
 
-/// Errors: kInvalidArgument naming `name` and the known ones; kMismatch if the occluders belong to
-/// another scene. Cost: O(objects log objects).
+/// Errors: kInvalidArgument naming `name` and the known ones, or what check_numbers() finds;
+/// kMismatch if the occluders belong to another scene. Cost: O(objects log objects).
 Result<std::unique_ptr<Method>> make_method(std::string_view name, const Scene& scene,
                                             const OccluderSet& occluders,
                                             const MethodOptions& options = {});

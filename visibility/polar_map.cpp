@@ -196,8 +196,10 @@ HWY_INLINE bool hidden_in_run(const PolarMap& map, const Box& box, std::int32_t 
       const std::uint32_t want = blocks == 16 ? 0xffffU : ((1U << blocks) - 1U);
       std::uint32_t fails = want & ~hidden_in_16<kUndersides>(map.coarse(), map.coarse_stride(), static_cast<std::size_t>(at / 16), box);
       for (; fails != 0; fails &= fails - 1) {
-        const auto b = static_cast<std::size_t>(at + 16 * std::countr_zero(fails));
-        if (hidden_in_16<kUndersides>(planes, stride, b, box) != 0xffffU) return false;
+        const std::int32_t bin = at + 16 * std::countr_zero(fails);
+        if (hidden_in_16<kUndersides>(planes, stride, static_cast<std::size_t>(bin), box) !=
+            0xffffU)
+          return false;
       }
       at += 16 * blocks;
       continue;
@@ -326,7 +328,11 @@ template <bool kUndersides>
 class WallPainter {
  public:
   WallPainter(PolarMap& map, const View& view, const PolarGuards& guards, PolarStats& stats)
-      : map_(map), view_(view), guards_(guards), stats_(stats), face_(static_cast<float>(view.bins / 4)) {}
+      : map_(map),
+        view_(view),
+        guards_(guards),
+        stats_(stats),
+        face_(static_cast<float>(view.bins) / 4) {}
 
   void paint(const WallSet& walls, const WallSet::Solid& solid, const Height& height) {
     const WallSet::Ring& first = walls.rings[solid.first_ring];

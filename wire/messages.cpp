@@ -46,13 +46,12 @@ flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Hello& m) {
   return e.Finish();
 }
 
-flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Welcome& m) {
+/// An empty `packed_table` is none.
+flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Welcome& m,
+                                      std::span<const std::uint8_t> packed_table) {
   IVIS_ASSERT(m.objects <= kMaxObjects, "the scene has no more objects than the protocol takes");
   flatbuffers::Offset<flatbuffers::Vector<std::uint8_t>> table = 0;
-  if (!m.table.id.empty()) {
-    IVIS_ASSERT(m.table.id.size() == m.objects, "the table has a row an object");
-    table = b.CreateVector(pack_table(m.table));
-  }
+  if (!packed_table.empty()) table = b.CreateVector(packed_table.data(), packed_table.size());
   const auto reach = put_string(b, m.reach, kMaxNameBytes);
   const auto method = put_string(b, m.method, kMaxNameBytes);
   const auto welcome = fb::CreateWelcome(b, m.version, m.session, m.scene_hash, m.order_hash,
@@ -60,6 +59,12 @@ flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Welcome& m) {
   fb::EnvelopeBuilder e(b);
   e.add_welcome(welcome);
   return e.Finish();
+}
+
+flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Welcome& m) {
+  if (m.table.id.empty()) return put(b, m, {});
+  IVIS_ASSERT(m.table.id.size() == m.objects, "the table has a row an object");
+  return put(b, m, pack_table(m.table));
 }
 
 flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const PoseMessage& m) {
@@ -186,14 +191,24 @@ Result<Message> get(const fb::Envelope& e) {
   return Message(Bye{e.bye()->session()});
 }
 
+std::vector<std::byte> finish(FlatBufferBuilder& b, flatbuffers::Offset<fb::Envelope> envelope) {
+  b.FinishSizePrefixed(envelope);
+  IVIS_ASSERT(b.GetSize() <= kMaxMessageBytes, "a message keeps to its limit");
+  const auto* first = reinterpret_cast<const std::byte*>(b.GetBufferPointer());
+  return {first, first + b.GetSize()};
+}
+
 }  // namespace
 
 std::vector<std::byte> encode(const Message& message) {
   FlatBufferBuilder b(512);
-  b.FinishSizePrefixed(std::visit([&](const auto& m) { return put(b, m); }, message));
-  IVIS_ASSERT(b.GetSize() <= kMaxMessageBytes, "a message keeps to its limit");
-  const auto* first = reinterpret_cast<const std::byte*>(b.GetBufferPointer());
-  return {first, first + b.GetSize()};
+  return finish(b, std::visit([&](const auto& m) { return put(b, m); }, message));
+}
+
+std::vector<std::byte> encode(const Welcome& welcome, std::span<const std::uint8_t> packed_table) {
+  IVIS_ASSERT(welcome.table.id.empty(), "one table a Welcome, packed or not");
+  FlatBufferBuilder b(512);
+  return finish(b, put(b, welcome, packed_table));
 }
 
 Result<Message> decode(std::span<const std::byte> bytes) {

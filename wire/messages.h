@@ -116,6 +116,10 @@ inline constexpr std::size_t kMaxTextBytes = 1024;  ///< Refused::text
 /// them.
 std::vector<std::byte> encode(const Message& message);
 
+/// A Welcome whose table (empty in `welcome`) is packed already, by pack_table(): for a server that
+/// tells many clients of one scene.
+std::vector<std::byte> encode(const Welcome& welcome, std::span<const std::uint8_t> packed_table);
+
 /// Errors: kInput naming what is wrong. Bounds: at most kMaxMessageBytes, every count is checked
 /// against the bytes left (and the table's decompressed size against `objects`) before anything is
 /// allocated. The payload of a PVS is not looked into; a version other than ours is not an error

@@ -2,6 +2,9 @@
 
 #include "client_lib/local_source.h"
 
+#include <new>
+#include <stdexcept>
+
 #include <gtest/gtest.h>
 
 #include "client_lib/client.h"
@@ -85,6 +88,40 @@ TEST_F(LocalClient, WhatCannotBeSolvedIsEverything) {
   EXPECT_EQ(frame.everything, 1);
   EXPECT_EQ(frame.visible_count, scene.object_count());
   EXPECT_STREQ(ivis_client_error(client), "below the world");
+}
+
+class ThrowingMethod : public NearMethod {
+ public:
+  using NearMethod::NearMethod;
+  Result<Pvs> solve(const ViewCell& cell) const override {
+    if (cell.eye.x > 300) throw 42;
+    if (cell.eye.x > 200) throw std::runtime_error("a library's complaint");
+    if (cell.eye.x > 100) throw std::bad_alloc();
+    return NearMethod::solve(cell);
+  }
+};
+
+TEST_F(LocalClient, AMethodThatThrowsIsAnsweredWithEverythingAndTheReason) {
+  TearDown();
+  method = std::make_shared<ThrowingMethod>(scene);
+  SetUp();
+  const std::pair<double, const char*> cases[]{{101, "out of memory"},
+                                               {201, "the method failed: a library's complaint"},
+                                               {4, ""},
+                                               {301, "unknown error"},
+                                               {102, "out of memory"},
+                                               {5, ""}};
+  for (const auto& [x, error] : cases) {
+    const double eye[3]{x, 1, 12};
+    ivis_frame frame;
+    ivis_client_pose(client, eye);
+    ASSERT_EQ(ivis_client_wait(client, kWait), IVIS_OK);
+    ASSERT_EQ(ivis_client_view(client, eye, &frame), IVIS_OK);
+    EXPECT_STREQ(ivis_client_error(client), error);
+    const bool solved = *error == '\0';
+    EXPECT_EQ(frame.everything, solved ? 0 : 1);
+    EXPECT_EQ(frame.visible_count == scene.object_count(), !solved);
+  }
 }
 
 TEST_F(LocalClient, ClosesWhileItSolves) {

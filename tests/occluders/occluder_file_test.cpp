@@ -186,6 +186,7 @@ TEST(OccluderFile, RefusesValuesOutOfTheirRange) {
                  {kHasGround, 2, 1},
                  {kHasGround + 1, infinity, 8},
                  {kFirstPrism, nan, 8},
+                 {kFirstPrism, std::bit_cast<std::uint64_t>(2e9), 8},
                  {kFirstPrism, std::bit_cast<std::uint64_t>(9.0), 8},
                  {kFirstPrism + 24, 2, 1},
                  {kRingCount, 0, 4},
@@ -247,6 +248,18 @@ TEST(OccluderFile, OnlyServesItsOwnSceneAndReachesItContains) {
   ASSERT_FALSE(larger);
   EXPECT_EQ(larger.error().code, ErrorCode::kMismatch);
   EXPECT_THAT(larger.error().message, HasSubstr("cylinder:1.6,0.1"));
+}
+
+TEST(OccluderFile, ServesAReachByTheSlackOfItsOwnSet) {
+  // Padding scales an ellipsoid up as a whole: with much slack it outgrows the cylinder.
+  OccluderSet set = example();
+  set.reach = Reach::cylinder(1, 0.5);
+  const Reach wanted = Reach::ellipsoid({0.95, 0.4, 0.95});
+  for (const double slack_m : {0.001, 0.05}) {
+    set.slack_m = slack_m;
+    EXPECT_EQ(serves(set, wanted), slack_m < 0.01);
+    EXPECT_EQ(check_occluders(set, set.scene_hash, wanted, "f").has_value(), slack_m < 0.01);
+  }
 }
 
 TEST(OccluderFile, IsWrittenAndReadWholeAndAMissingOneIsNamed) {

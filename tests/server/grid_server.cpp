@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, [](int) { stop = true; });
   const ivis::Scene scene = ivis::test::grid_scene(std::atoi(argv[2]));
   const ivis::test::NearMethod method(scene);
-  const auto served = ivis::server::served_scene(scene);
+  const auto served = ivis::server::served_scene(scene, {});
   ivis::server::Log log(ivis::server::LogLevel::kInfo, false);
   ivis::server::ServerOptions options;
   options.listen = argv[1];

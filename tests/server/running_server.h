@@ -17,7 +17,7 @@ class RunningServer {
   RunningServer(const Scene& scene, const Method& method,
                 const Reach& reach = Reach::cylinder(1.5, 0.1),
                 const std::string& listen = "tcp://127.0.0.1:*", server::SessionLimits limits = {})
-      : served_(server::served_scene(scene)), log_(server::LogLevel::kOff, false) {
+      : served_(server::served_scene(scene, {})), log_(server::LogLevel::kOff, false) {
     server::ServerOptions options;
     options.listen = listen;
     options.limits = limits;

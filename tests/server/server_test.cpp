@@ -133,7 +133,7 @@ class Address : public ServerSocket {
  protected:
   std::string path = ::testing::TempDir() + "ivis_address_" + std::to_string(getpid()) + ".sock";
   std::string ipc = "ipc://" + path;
-  server::ServedScene served = server::served_scene(scene);
+  server::ServedScene served = server::served_scene(scene, {});
   server::Log log{server::LogLevel::kOff, false};
   void TearDown() override { std::filesystem::remove(path); }
 
@@ -195,6 +195,20 @@ TEST_F(Address, ProbingLeavesNothingBehind) {
   }
   EXPECT_TRUE(server::probe_address(endpoint));
   RunningServer server(scene, method, Reach::disc(1), endpoint);
+}
+
+TEST_F(Address, AnIpv4AddressOnASocketOfIpv6IsSaidInPlain) {
+  using server::plain_endpoint;
+  EXPECT_EQ(plain_endpoint("tcp://[::ffff:127.0.0.1]:7447"), "tcp://127.0.0.1:7447");
+  for (const std::string kept : {"tcp://127.0.0.1:7447", "tcp://[::1]:7447", "tcp://[::ffff:1.2",
+                                 "ipc:///tmp/[::ffff:1.2.3.4]"})
+    EXPECT_EQ(plain_endpoint(kept), kept);
+  const std::string mapped = "tcp://[::ffff:127.0.0.1]:*";
+  if (!server::probe_address(mapped)) GTEST_SKIP() << "no IPv6 here";
+  RunningServer server(scene, method, Reach::disc(1), mapped);
+  EXPECT_THAT(server.endpoint(), ::testing::StartsWith("tcp://127.0.0.1:"));
+  RawPeer peer(server.endpoint());
+  EXPECT_TRUE(peer.answered(peer.greet(), 1));
 }
 
 TEST_F(Address, AFileThatIsNoSocketIsLeftAlone) {

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/server/fake_method.h"
+#include "wire/object_table.h"
 
 namespace ivis::test {
 namespace {
@@ -27,7 +28,7 @@ class Sessions : public ::testing::Test {
  protected:
   Scene scene = grid_scene(12);
   NearMethod method{scene};
-  server::ServedScene served = server::served_scene(scene);
+  server::ServedScene served = server::served_scene(scene, {});
   server::SessionLimits limits;
   SessionTable::Time now{};
   std::unique_ptr<SessionTable> table_;
@@ -102,6 +103,22 @@ TEST_F(Sessions, WelcomeNamesEveryObject) {
   ASSERT_EQ(w.table.id.size(), scene.object_count());
   for (Rank r = 0; r < w.objects; ++r)
     EXPECT_EQ(w.table.node[r], scene.objects[w.table.id[r]].node);
+}
+
+TEST_F(Sessions, WelcomeCarriesTheTableThatWasPackedOnce) {
+  wire::ObjectTable other;
+  for (std::uint32_t i = 0; i < served.objects(); ++i) {
+    other.id.push_back(i);
+    other.node.push_back(1000 + i);
+    other.instance.push_back(0);
+  }
+  served.packed_table = wire::pack_table(other);
+  say({"a", 0, {}, {}}, wire::Hello{});
+  EXPECT_EQ(std::get<wire::Welcome>(decoded(*table().work(), "a")).table, other);
+  wire::Hello hello;
+  hello.want_table = false;
+  say({"b", 0, {}, {}}, hello);
+  EXPECT_TRUE(std::get<wire::Welcome>(decoded(*table().work(), "b")).table.id.empty());
 }
 
 TEST_F(Sessions, FirstAnswerIsFullAndLaterOnesDiffer) {
@@ -232,6 +249,22 @@ TEST_F(Sessions, ServesASmallerReachAndRefusesALargerOne) {
   EXPECT_EQ(reason(say({"a", 0, {}, {}}, hello)), Refusal::kReach);
   hello.reach = "nonsense";
   EXPECT_EQ(reason(say({"a", 0, {}, {}}, hello)), Refusal::kReach);
+}
+
+TEST_F(Sessions, CompareReachesWithTheSlackOfTheOccludersAsASolveDoes) {
+  // Padding scales an ellipsoid up as a whole: with much slack it outgrows the cylinder.
+  OccluderSet occluders;
+  occluders.reach = Reach::cylinder(1, 0.5);
+  wire::Hello hello;
+  hello.reach = "ellipsoid:0.95,0.4,0.95";
+  for (const double slack_m : {0.001, 0.05}) {
+    occluders.slack_m = slack_m;
+    served = server::served_scene(scene, occluders);
+    table_ = std::make_unique<SessionTable>(served, method, occluders.reach, limits);
+    const auto refused = say({"a", 0, {}, {}}, hello);
+    EXPECT_EQ(!refused, serves(occluders, *Reach::parse(hello.reach))) << slack_m;
+    EXPECT_EQ(!refused, slack_m < 0.01);
+  }
 }
 
 TEST_F(Sessions, GarbageIsRefusedAndCountedAndEndsNothing) {

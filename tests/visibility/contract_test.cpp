@@ -214,6 +214,48 @@ TEST(MethodContractCell, OccludersOfAnotherSceneAreRefusedByWhoeverNeedsThem) {
   }
 }
 
+TEST(MethodContractCell, OccludersWithNumbersThatCannotBeComputedWithAreRefused) {
+  const ContractScene s = test::analytic_scenes().front();
+  const OccluderSet sound = shrunk(s.scene, Reach::disc(1));
+  ASSERT_FALSE(sound.shrunk.empty());
+  ASSERT_FALSE(sound.solids.empty());
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  using Spoil = void (*)(OccluderSet&, double);
+  const std::vector<std::pair<const char*, Spoil>> fields{
+      {"slack", [](OccluderSet& o, double v) { o.slack_m = v; }},
+      {"floor", [](OccluderSet& o, double v) { o.floor = v; }},
+      {"reach", [](OccluderSet& o, double v) { o.reach = Reach::ball(v); }},
+      {"ground",
+       [](OccluderSet& o, double v) {
+         o.ground = {{0, 0, 0}, {1, 1, v}};
+       }},
+      {"bottom", [](OccluderSet& o, double v) { o.shrunk[0].bottom = v; }},
+      {"top", [](OccluderSet& o, double v) { o.shrunk[0].top = v; }},
+      {"solid bottom", [](OccluderSet& o, double v) { o.shrunk[0].solid_bottom = v; }},
+      {"corner x", [](OccluderSet& o, double v) { o.shrunk[0].footprint.rings[0][1].x = v; }},
+      {"corner z", [](OccluderSet& o, double v) { o.solids[0].footprint.rings[0][1].y = v; }}};
+  const auto refusal = [&](const OccluderSet& set, const std::string& method) {
+    const auto made = make_method(method, s.scene, set);
+    EXPECT_TRUE(made || made.error().code == ErrorCode::kInvalidArgument);
+    return made ? "" : made.error().message;
+  };
+  for (const MethodTraits& traits : method_list()) {
+    EXPECT_EQ(refusal(sound, traits.name), "");
+    for (const auto& [field, spoil] : fields)
+      for (const double v : {2e9, kNan}) {
+        OccluderSet bad = sound;
+        spoil(bad, v);
+        EXPECT_NE(refusal(bad, traits.name).find(field), std::string::npos) << field << ' ' << v;
+      }
+    OccluderSet bad = sound;
+    bad.solids[0].top = bad.solids[0].bottom - 1;
+    EXPECT_NE(refusal(bad, traits.name).find("solid 0: top"), std::string::npos);
+    bad = sound;
+    bad.slack_m = -0.001;
+    EXPECT_NE(refusal(bad, traits.name).find("slack"), std::string::npos);
+  }
+}
+
 TEST(VerifierPower, FindsThatOccludersWereShrunkForAReachTenPercentTooSmall) {
   // Far behind a wall the bound is tight: what shows above its top from two metres farther back
   // than the eye.

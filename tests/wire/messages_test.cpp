@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "made_up.h"
+#include "wire/object_table.h"
 
 namespace ivis::wire {
 namespace {
@@ -101,6 +102,14 @@ TEST(WireMessages, CutTheirOwnStringsToTheBound) {
   const auto back = decode(encode(Refused{1, Refusal::kBusy, std::string(5000, 'x')}));
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_EQ(std::get<Refused>(*back).text.size(), kMaxTextBytes);
+}
+
+TEST(WireMessages, AWelcomeIsTheSameWhoeverPacksItsTable) {
+  Welcome w{1, 2, 3, 4, 3, "disc:1", "m", {{2, 0, 1}, {10, 10, 11}, {1, 0, 0}}};
+  const Bytes whole = encode(w);
+  const auto packed = pack_table(w.table);
+  w.table = {};
+  EXPECT_EQ(encode(w, packed), whole);
 }
 
 TEST(WireMessages, LeaveAnotherVersionToTheReceiver) {

@@ -1,6 +1,7 @@
 /* The interface of ivis.h without a network: a worker thread of this process solves for the latest
  * pose. For a renderer with a core to spare. Library ivis_local; everything but opening is in
- * ivis.h. */
+ * ivis.h. A pose that cannot be solved (out of memory) gets every object, and ivis_client_error()
+ * says why. */
 #ifndef IVIS_IVIS_LOCAL_H
 #define IVIS_IVIS_LOCAL_H
 

@@ -1,5 +1,5 @@
 #pragma once
-// Balanced tree of boxes in the plane: which of many edges or triangles lie near a place?
+// Balanced tree of rectangles in the plane: which of many edges or triangles lie near a place?
 
 #include <algorithm>
 #include <cstddef>
@@ -36,10 +36,10 @@ struct Box2 {
 
 /// Items by their boxes, split at the median: linear memory whatever the boxes are.
 /// Threads: a value; `all` is reentrant.
-class BoxTree {
+class RectTree {
  public:
-  BoxTree() = default;
-  explicit BoxTree(const std::vector<Box2>& boxes) : items_(boxes.size()) {
+  RectTree() = default;
+  explicit RectTree(const std::vector<Box2>& boxes) : items_(boxes.size()) {
     while (leaves_ * kLeafItems < items_.size())
       leaves_ *= 2;
     nodes_.resize(2 * leaves_);
