@@ -169,11 +169,6 @@ bool upright(const ConvexSolid& solid) {
 
 }  // namespace
 
-const std::vector<double>& default_margins() {
-  static const std::vector<double> margins{0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 4};
-  return margins;
-}
-
 // Every triangle either lies on a plane found before, or makes one that all corners lie behind
 // (within the tolerance); the solid is what lies behind the lowest corner of every plane, so no
 // triangle enters it: parity is one for all of it, and is asked once. Seams (seam_m > 0): the

@@ -30,10 +30,6 @@ struct ObjectConvex {
   std::map<std::string, std::size_t> left_out;  ///< reason -> pieces
 };
 
-/// Margins for the occlusion map, metres, where nobody has chosen any: small ones for rooms, large
-/// ones for towns.
-const std::vector<double>& default_margins();
-
 /// The convex closed pieces of one object. Winding is not trusted (docs/theory.md, 1): parity
 /// decides what is inside. Where the scene honours sidedness and the object has single-sided
 /// triangles, only pieces that are wound outwards throughout are taken, as by extract_prisms().

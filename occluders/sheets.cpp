@@ -4,10 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 
-#include "core/view_cell.h"
 #include "occluders/box_tree.h"
 #include "occluders/clip.h"
 #include "occluders/distance_check.h"
@@ -429,27 +427,6 @@ class SheetBuilder {
 };
 
 }  // namespace
-
-double sheet_reach_m(const Reach& reach, double slack_m) {
-  const double h = kReachToleranceM;
-  const Vec3 e = reach.half_extents() + Vec3{h, vertical_tolerance(reach), h};
-  double most = 0;
-  switch (reach.kind()) {
-    case Reach::Kind::kBall:
-    case Reach::Kind::kEllipsoid:
-      most = std::max({e.x, e.y, e.z});
-      break;
-    case Reach::Kind::kDisc:
-    case Reach::Kind::kCylinder:
-      most = std::hypot(e.x, e.y);
-      break;
-    case Reach::Kind::kBox:
-      most = glm::length(e);
-      break;
-  }
-  // The slack is that of an upright cylinder, as padded() takes it.
-  return most + std::numbers::sqrt2 * slack_m;
-}
 
 std::vector<double> sheet_radii(double r_v_m) {
   std::vector<double> radii;

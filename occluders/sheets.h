@@ -1,7 +1,7 @@
 #pragma once
 // Occluders without volume: parts of planes in which nothing but opaque matter lies.
 //
-// What the occlusion map has to know. A cell P + V; r_V = sheet_reach_m(reach, slack). Of a sheet
+// What the occlusion map has to know. A cell P + V; r_V = largest_move(reach, slack). Of a sheet
 // {normal n, offset o} let a = n.P - o; of the face, or tile, to be drawn let D be the largest
 // distance of its corners from P, and e the largest displacement, parallel to the image plane, of a
 // point of a pixel from the pixel's centre at the depth of any of it (docs/theory.md, 3). Level k
@@ -28,11 +28,6 @@
 #include "occluders/occluder_set.h"
 
 namespace ivis {
-
-/// Largest |v| of any move that a solution for this reach serves: poses that ViewCell::contains()
-/// accepts, and `slack_m` of floating-point error besides. Less than that of padded(): a ball stays
-/// round.
-double sheet_reach_m(const Reach& reach, double slack_m);
 
 /// The ladder of radii for sheets, ascending: r_V times 1.05 and further powers of 1.3, up to 19: a
 /// level is at most 1.3 times what is needed, and walls are used until they are seen under 3
