@@ -117,9 +117,7 @@ Result<Pvs> OcclusionMap::solve(const ViewCell& cell, Stats& stats) const {
   for (int i = 0; i < 3; ++i) c.single[i] = static_cast<float>(c.eye[i]);
   c.reach = padded(cell.reach, occluders_.slack_m);
   const Vec3 half = c.reach.half_extents();
-  c.radius = c.reach.kind() == Reach::Kind::kBox        ? glm::length(half)
-             : c.reach.kind() == Reach::Kind::kCylinder ? std::hypot(std::max(half.x, half.z), half.y)
-                                                        : std::max({half.x, half.y, half.z});
+  c.radius = largest_move(cell.reach, occluders_.slack_m);
   const Aabb box{cell.eye - half, cell.eye + half};
   c.above_floor = box.lo.y >= occluders_.floor;
   const Aabb& ground = occluders_.ground;
