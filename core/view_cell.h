@@ -1,5 +1,9 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 #include "core/reach.h"
 
 namespace ivis {
@@ -23,6 +27,23 @@ inline Reach padded(const Reach& r, double slack_m) {
 /// The one comparison of reaches: of what both are padded to, as that is what an answer promises.
 inline bool serves(const Reach& shrunk_for, double slack_m, const Reach& wanted) {
   return padded(shrunk_for, slack_m).contains(padded(wanted, slack_m));
+}
+
+/// Largest |v| of any move that a solution serves: those that ViewCell::contains() accepts, and
+/// `slack_m` of error besides (an upright cylinder's, as padded() takes it). Less than that of
+/// padded(), as a ball stays round here.
+inline double largest_move(const Reach& r, double slack_m) {
+  const Vec3 e =
+      r.half_extents() + Vec3{kReachToleranceM, vertical_tolerance(r), kReachToleranceM};
+  const double slack = std::numbers::sqrt2 * slack_m;
+  switch (r.kind()) {
+    case Reach::Kind::kBall:
+    case Reach::Kind::kEllipsoid: return slack + std::max({e.x, e.y, e.z});
+    case Reach::Kind::kDisc:
+    case Reach::Kind::kCylinder: return slack + std::hypot(e.x, e.y);
+    case Reach::Kind::kBox: break;
+  }
+  return slack + glm::length(e);
 }
 
 /// Every viewpoint that one visibility solution must serve: eye + reach.

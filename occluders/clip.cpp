@@ -81,7 +81,7 @@ void collect(const cl::PolyNode& parent, const Frame& frame, std::vector<Polygon
   }
 }
 
-std::vector<Polygon> execute(const std::vector<Ring>& subject, Fill fill,
+std::vector<Polygon> execute(cl::ClipType operation, const std::vector<Ring>& subject, Fill fill,
                              const std::vector<Ring>& convex) {
   std::vector<Polygon> result;
   const Frame frame(subject);
@@ -100,8 +100,7 @@ std::vector<Polygon> execute(const std::vector<Ring>& subject, Fill fill,
       clipper.AddPath(path, cl::ptClip, true);
     }
     cl::PolyTree tree;
-    if (!clipper.Execute(convex.empty() ? cl::ctUnion : cl::ctDifference, tree, fill_type(fill),
-                         cl::pftNonZero))
+    if (!clipper.Execute(operation, tree, fill_type(fill), cl::pftNonZero))
       return result;
     collect(tree, frame, result);
   } catch (const std::exception&) {  // out of the library's range: nothing is always safe
@@ -113,12 +112,16 @@ std::vector<Polygon> execute(const std::vector<Ring>& subject, Fill fill,
 }  // namespace
 
 std::vector<Polygon> unite(const std::vector<Ring>& rings, Fill fill) {
-  return execute(rings, fill, {});
+  return execute(cl::ctUnion, rings, fill, {});
 }
 
 std::vector<Polygon> subtract(const std::vector<Ring>& subject, Fill fill,
                               const std::vector<Ring>& convex) {
-  return execute(subject, fill, convex);
+  return execute(convex.empty() ? cl::ctUnion : cl::ctDifference, subject, fill, convex);
+}
+
+std::vector<Polygon> intersect(const std::vector<Ring>& subject, Fill fill, const Ring& convex) {
+  return execute(cl::ctIntersection, subject, fill, {convex});
 }
 
 Ring convex_hull(std::vector<Vec2> points) {

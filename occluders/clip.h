@@ -34,6 +34,9 @@ std::vector<Polygon> unite(const std::vector<Ring>& rings, Fill fill);
 std::vector<Polygon> subtract(const std::vector<Ring>& subject, Fill fill,
                               const std::vector<Ring>& convex);
 
+/// The region that `subject` fills inside one convex ring. The pieces come back as from unite().
+std::vector<Polygon> intersect(const std::vector<Ring>& subject, Fill fill, const Ring& convex);
+
 /// Convex hull, positive area; empty when the points lie on a line.
 Ring convex_hull(std::vector<Vec2> points);
 

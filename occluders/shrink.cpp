@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/view_cell.h"
+#include "occluders/add_convex.h"
 #include "occluders/clip.h"
 #include "occluders/fuse.h"
 #include "occluders/gate.h"
@@ -163,6 +164,10 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
     });
   }
   if (context.stopped()) return cancelled();
+  if (Status s = add_convex_and_sheets(scene, objects, is_ground, options, context, found, set,
+                                       report);
+      !s)
+    return s.error();
 
   for (std::size_t i = 0; i < found.size(); ++i) {
     report.solid_volume += found[i].volume;

@@ -25,11 +25,21 @@ struct ShrinkReport {
   std::size_t occluders_in = 0;                 ///< objects considered
   std::size_t occluders_out = 0;                ///< shrunk prisms
   std::map<std::string, std::size_t> left_out;  ///< reason -> objects (or pieces)
+  std::size_t convex_solids = 0;                ///< that are no upright prisms
+  std::size_t convex_pieces = 0;                ///< of these, what the reach leaves
+  std::size_t sheet_planes = 0;
+  std::size_t sheet_tiles = 0;
+  std::size_t sheet_faces = 0;  ///< of all levels
+  double sheet_seconds = 0;
   double solid_volume = 0;                      ///< cubic metres, real solids, without extensions
   double kept_volume = 0;                       ///< of the shrunk prisms, without extensions
   double seconds = 0;
   double volume_kept() const { return solid_volume > 0 ? kept_volume / solid_volume : 0; }
 };
+
+/// kAuto: where they promise gain: observers are inside, or most convex solids are marked `only` and
+/// many of them are no upright prisms.
+enum class SheetUse : std::uint8_t { kAuto, kOff, kOn };
 
 struct ShrinkOptions {
   Reach reach;
@@ -37,6 +47,7 @@ struct ShrinkOptions {
   /// Also make what the occlusion map draws.
   bool margins = true;
   std::vector<double> margins_m;  ///< empty: default_margins() of the reach
+  SheetUse sheets = SheetUse::kAuto;
 };
 
 struct Shrunk {

@@ -43,17 +43,24 @@ Outcome run(const Args& args) {
   const auto shrunk = shrink(*scene, options, *eroder, context);
   if (!shrunk) return shrunk.error();
   if (auto s = write_occluders(args.out, shrunk->set); !s) return s.error();
-  if (shrunk->set.shrunk.empty()) std::cerr << "warning: no occluder is left for this reach: every PVS will list everything\n";
+  if (shrunk->set.shrunk.empty() && shrunk->set.solid_pieces.empty() && shrunk->set.sheets.empty()) std::cerr << "warning: no occluder is left for this reach: every PVS will list everything\n";
   const ShrinkReport& r = shrunk->report;
   if (args.json) {
     Json left_out = Json::object();
     for (const auto& [reason, count] : r.left_out) left_out[reason] = count;
     print({{"occluders_in", r.occluders_in}, {"occluders_out", r.occluders_out}, {"left_out", left_out},
+           {"convex_solids", r.convex_solids}, {"convex_pieces", r.convex_pieces}, {"sheet_planes", r.sheet_planes},
+           {"sheet_tiles", r.sheet_tiles}, {"sheet_faces", r.sheet_faces}, {"sheet_seconds", r.sheet_seconds},
            {"volume_kept", r.volume_kept()}, {"seconds", r.seconds}});
     return kOk;
   }
   std::cout << r.occluders_in << " objects -> " << r.occluders_out << " shrunk prisms in " << r.seconds << " s ("
             << eroder->name() << " builder), " << 100 * r.volume_kept() << " % of the solids' volume kept\n";
+  if (r.convex_solids > 0)
+    std::cout << "  " << r.convex_solids << " convex solids that are no prisms, " << r.convex_pieces << " of them thicker than the reach\n";
+  if (r.sheet_tiles > 0)
+    std::cout << "  " << r.sheet_tiles << " sheets in " << r.sheet_planes << " planes, " << r.sheet_faces << " faces in all levels, in "
+              << r.sheet_seconds << " s\n";
   for (const auto& [reason, count] : r.left_out) std::cout << "  not taken: " << count << "  " << reason << '\n';
   std::cout << "written: " << args.out.string() << '\n';
   return kOk;

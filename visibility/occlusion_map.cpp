@@ -125,10 +125,7 @@ Result<Pvs> OcclusionMap::solve(const ViewCell& cell, Stats& stats) const {
     c.single[i] = static_cast<float>(c.eye[i]);
   c.reach = padded(cell.reach, occluders_.slack_m);
   const Vec3 half = c.reach.half_extents();
-  c.radius = c.reach.kind() == Reach::Kind::kBox ? glm::length(half)
-             : c.reach.kind() == Reach::Kind::kCylinder
-                 ? std::hypot(std::max(half.x, half.z), half.y)
-                 : std::max({half.x, half.y, half.z});
+  c.radius = largest_move(cell.reach, occluders_.slack_m);
   const Aabb box{cell.eye - half, cell.eye + half};
   c.above_floor = box.lo.y >= occluders_.floor;
   const Aabb& ground = occluders_.ground;
@@ -214,14 +211,12 @@ void OcclusionMap::draw_piece(const OccluderPieces::Piece& piece, std::uint32_t 
   const auto margin_at = [&](double w) { return kMarginFactor * w / pixels; };
   std::uint32_t level = 0;
   if (piece.kind == OccluderPieces::Kind::kSheet) {
-    // docs/theory.md, 9: the line of sight through a pixel meets the plane within r of where its
-    // centre's ray does, at most D + r away, so its angle's cosine is at least a / (D + r); r = (R
-    // + margin) (D + r) / a, solved for r.
+    // The rule and why it holds: occluders/sheets.h.
     const double a = glm::dot(piece.normal, cell.eye) - piece.offset;
-    const double needed = cell.radius + margin_at(std::max({far[0], far[1], far[2]}));
-    if (a <= 1.001 * needed) return;
-    double r = needed * std::sqrt(across) / (a - needed) * (1 + 1e-6);
-    if (!guards_.sheet_obliqueness) r = needed;
+    const double e = margin_at(std::max({far[0], far[1], far[2]}));
+    if (a <= 1.001 * cell.radius || a <= 1.001 * e) return;
+    double r = (cell.radius + e) * std::sqrt(across) / (a - e) * (1 + 1e-6);
+    if (!guards_.sheet_obliqueness) r = cell.radius + e;
     while (level < piece.levels && pieces_.sheet_radii_m[level] < r)
       ++level;
   } else {
