@@ -52,6 +52,20 @@ Error error_of(ivis_status status, std::string text) {
   }
 }
 
+/// For one who reads that nobody answers: what to look at.
+Error no_answer(const std::string& endpoint, const std::string& text) {
+  const std::string named = text.starts_with(endpoint) ? text : endpoint + ": " + text;
+  return connection_error(
+      named + "\n  Is an ivisd running that listens there ('ivisd --scene FILE --listen " +
+      endpoint +
+      "'; its log says 'event=listening')? Is it still loading? Is the address the same on "
+      "both sides, and the way to it open?");
+}
+
+bool unanswered(ivis_status status) {
+  return status == IVIS_ERROR_CONNECTION || status == IVIS_ERROR_TIMEOUT;
+}
+
 Vec3 vec(const double (&p)[3]) {
   return {p[0], p[1], p[2]};
 }
@@ -113,7 +127,7 @@ Result<WalkReport> walk(const std::string& endpoint, const std::vector<Pose>& pa
   ivis_client* raw = nullptr;
   char text[512] = "";
   if (const ivis_status s = ivis_client_connect(&wanted, &raw, text, sizeof text); s != IVIS_OK)
-    return error_of(s, text);
+    return unanswered(s) ? no_answer(endpoint, text) : error_of(s, text);
   VisibilityClient client(raw);
   auto info = client.info();
   if (!info) return connection_error("the server at " + endpoint + " has not said what it serves");
@@ -135,7 +149,7 @@ Result<WalkReport> walk(const std::string& endpoint, const std::vector<Pose>& pa
     if (options.hz == 0) {
       static_cast<void>(client.pose(eye));
       if (const ivis_status s = client.wait(options.answer_timeout_ms); s != IVIS_OK)
-        return error_of(s, client.error());
+        return unanswered(s) ? no_answer(endpoint, client.error()) : error_of(s, client.error());
       view = client.view(eye);
     } else {
       std::this_thread::sleep_until(next);

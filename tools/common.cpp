@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <csignal>
@@ -9,6 +10,8 @@
 #include <ctime>
 #include <iostream>
 #include <sstream>
+#include <system_error>
+#include <utility>
 
 #include <unistd.h>
 
@@ -146,7 +149,49 @@ void SolveArgs::add_to(CLI::App& app, bool reach_required) {
   app.add_option("--reference-rays", rays, "aimed rays an object of the method 'reference'")->capture_default_str()->check(CLI::Range(1, 1000000));
 }
 
+Status check_input_file(const std::filesystem::path& file) {
+  std::error_code ec;
+  if (std::filesystem::is_directory(file, ec))
+    return io_error("'" + file.string() + "' is a folder, expected a file");
+  if (access(file.c_str(), R_OK) != 0)
+    return io_error("cannot open '" + file.string() +
+                    "': " + std::generic_category().message(errno));
+  return ok();
+}
+
+Status check_output_file(const std::filesystem::path& file) {
+  std::error_code ec;
+  if (std::filesystem::is_directory(file, ec))
+    return io_error("'" + file.string() + "' is a folder, expected the name of a file");
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  if (!std::filesystem::is_directory(folder, ec))
+    return io_error("cannot write '" + file.string() + "': there is no folder '" + folder.string() +
+                    "'");
+  if (access(folder.c_str(), W_OK | X_OK) != 0)
+    return io_error("cannot write '" + file.string() +
+                    "': " + std::generic_category().message(errno));
+  return ok();
+}
+
+Status check_output_folder(const std::filesystem::path& folder) {
+  std::error_code ec;
+  std::filesystem::path there = std::filesystem::absolute(folder, ec);
+  while (!std::filesystem::exists(there, ec) && there.has_relative_path())
+    there = there.parent_path();
+  if (!std::filesystem::is_directory(there, ec))
+    return io_error("cannot make folder '" + folder.string() + "': '" + there.string() +
+                    "' is not a folder");
+  if (access(there.c_str(), W_OK | X_OK) != 0)
+    return io_error("cannot write into '" + folder.string() +
+                    "': " + std::generic_category().message(errno));
+  return ok();
+}
+
 Result<Reach> SolveArgs::parse_reach() const { return Reach::parse(reach); }
+
+Status SolveArgs::check_files() const {
+  return occluders.empty() ? ok() : check_input_file(occluders);
+}
 
 Result<OccluderSet> SolveArgs::get_occluders(const Scene& scene, const Reach& wanted, const Context& context) const {
   if (occluders.empty()) {
@@ -169,6 +214,22 @@ Result<std::unique_ptr<Method>> SolveArgs::make(const Scene& scene, const Occlud
   options.max_occluders = max_occluders;
   options.rays = rays;
   return make_method(method, scene, set, options);
+}
+
+Result<std::unique_ptr<Prepared>> prepare(const SceneArgs& scene, const SolveArgs& solve,
+                                          const Reach& reach, const Context& context) {
+  if (auto s = solve.check_files(); !s) return s.error();
+  auto prepared = std::make_unique<Prepared>();
+  auto loaded = scene.load(context);
+  if (!loaded) return loaded.error();
+  prepared->scene = std::move(*loaded);
+  auto set = solve.get_occluders(prepared->scene, reach, context);
+  if (!set) return set.error();
+  prepared->occluders = std::move(*set);
+  auto method = solve.make(prepared->scene, prepared->occluders);
+  if (!method) return method.error();
+  prepared->method = std::move(*method);
+  return prepared;
 }
 
 double percentile(std::vector<double> values, double p) {

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -49,6 +50,13 @@ struct SceneArgs {
   Result<Scene> load(const Context& context) const;
 };
 
+/// What a file or folder to be read or written can be refused for before the work that leads up to
+/// it. Nothing is opened for writing: the write itself may still fail. Errors: kIo, naming the
+/// path.
+Status check_input_file(const std::filesystem::path& file);
+Status check_output_file(const std::filesystem::path& file);
+Status check_output_folder(const std::filesystem::path& folder);  ///< that need not be there yet
+
 /// Where observers may be: --inside, --path, --outside.
 struct ViewSpaceArgs {
   std::vector<std::string> inside;
@@ -69,10 +77,26 @@ struct SolveArgs {
   std::size_t rays = 256;
   void add_to(CLI::App& app, bool reach_required);
   Result<Reach> parse_reach() const;
+  /// Of what needs no scene. Errors: kIo.
+  Status check_files() const;
   /// The occluder file, or the scene shrunk here and now by the fast builder.
   Result<OccluderSet> get_occluders(const Scene& scene, const Reach& reach, const Context& context) const;
   Result<std::unique_ptr<Method>> make(const Scene& scene, const OccluderSet& set) const;
 };
+
+/// What most subcommands work on. Not movable: `method` borrows the rest.
+struct Prepared {
+  Scene scene;
+  OccluderSet occluders;
+  std::unique_ptr<Method> method;
+
+  Prepared() = default;
+  Prepared(const Prepared&) = delete;
+  Prepared& operator=(const Prepared&) = delete;
+};
+/// Scene, then occluders for it, then a method over both.
+Result<std::unique_ptr<Prepared>> prepare(const SceneArgs& scene, const SolveArgs& solve,
+                                          const Reach& reach, const Context& context);
 
 double median(std::vector<double> values);
 double percentile(std::vector<double> values, double p);

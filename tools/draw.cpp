@@ -100,14 +100,11 @@ Outcome run(const Args& args) {
   if (!reach) return reach.error();
   const auto eye = parse_point(args.eye);
   if (!eye) return eye.error();
-  const Context context = make_context(false);
-  const auto scene = args.scene.load(context);
-  if (!scene) return scene.error();
-  const auto occluders = args.solve.get_occluders(*scene, *reach, context);
-  if (!occluders) return occluders.error();
-  const auto method = args.solve.make(*scene, *occluders);
-  if (!method) return method.error();
-  const auto pvs = (*method)->solve({*eye, *reach});
+  if (auto s = check_output_file(args.out); !s) return s.error();
+  const auto prepared = prepare(args.scene, args.solve, *reach, make_context(false));
+  if (!prepared) return prepared.error();
+  const auto& [scene, occluders, method] = **prepared;
+  const auto pvs = method->solve({*eye, *reach});
   if (!pvs) return pvs.error();
 
   Picture picture(ground(*eye), args.radius);
@@ -116,15 +113,15 @@ Outcome run(const Args& args) {
        << kPixels + 60 << "\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n<svg width=\"" << kPixels << "\" height=\"" << kPixels
        << "\">\n<rect width=\"100%\" height=\"100%\" fill=\"#8d93a8\"/>\n";
   picture.raw(head.str());
-  const Vec3 apex = *eye + Vec3{0, padded(*reach, occluders->slack_m).half_extents().y, 0};
-  picture.polygon(lit(*occluders, apex, 4 * args.radius), "fill=\"#f4f1e6\"");
-  for (const Prism& p : occluders->solids)
+  const Vec3 apex = *eye + Vec3{0, padded(*reach, occluders.slack_m).half_extents().y, 0};
+  picture.polygon(lit(occluders, apex, 4 * args.radius), "fill=\"#f4f1e6\"");
+  for (const Prism& p : occluders.solids)
     if (picture.sees(p.bounds())) picture.polygon(p.footprint, "fill=\"#c9b79c\" fill-opacity=\"0.8\" stroke=\"#6b5b45\" stroke-width=\"0.6\"");
-  for (const Prism& p : occluders->shrunk)
+  for (const Prism& p : occluders.shrunk)
     if (picture.sees(p.bounds())) picture.polygon(p.footprint, "fill=\"#4a4238\" fill-opacity=\"0.75\"");
   std::size_t drawn = 0;
   for (const ObjectId id : pvs->objects) {
-    const Object& o = scene->objects[id];
+    const Object& o = scene.objects[id];
     if (!picture.sees(o.bounds)) continue;
     const Vec3 size = o.bounds.size();
     const bool large = std::max(size.x, size.z) > 8;
@@ -134,12 +131,18 @@ Outcome run(const Args& args) {
   std::ostringstream tail;
   const Vec3 half = reach->half_extents();
   const double c = kPixels / 2;
-  tail << "<ellipse cx=\"" << c << "\" cy=\"" << c << "\" rx=\"" << std::max(half.x * picture.scale(), 1.0) << "\" ry=\"" << std::max(half.z * picture.scale(), 1.0)
-       << "\" fill=\"none\" stroke=\"#d62828\" stroke-width=\"1.5\"/>\n<circle cx=\"" << c << "\" cy=\"" << c << "\" r=\"2.5\" fill=\"#d62828\"/>\n</svg>\n"
-       << "<g font-family=\"sans-serif\" font-size=\"17\" fill=\"#222\"><text x=\"12\" y=\"" << kPixels + 24 << "\">" << pvs->objects.size() << " of "
-       << scene->objects.size() << " objects can be seen from " << reach->to_string() << " about the red dot (" << drawn << " of them in this picture, "
-       << 2 * args.radius << " m wide)</text>\n<text x=\"12\" y=\"" << kPixels + 48
-       << "\">tan: occluders; dark: shrunk occluders; grey-blue: shadow at eye height; green: the PVS (outlines: large objects)</text></g>\n</svg>\n";
+  tail << "<ellipse cx=\"" << c << "\" cy=\"" << c << "\" rx=\""
+       << std::max(half.x * picture.scale(), 1.0) << "\" ry=\""
+       << std::max(half.z * picture.scale(), 1.0)
+       << "\" fill=\"none\" stroke=\"#d62828\" stroke-width=\"1.5\"/>\n<circle cx=\"" << c
+       << "\" cy=\"" << c << "\" r=\"2.5\" fill=\"#d62828\"/>\n</svg>\n"
+       << "<g font-family=\"sans-serif\" font-size=\"17\" fill=\"#222\"><text x=\"12\" y=\""
+       << kPixels + 24 << "\">" << pvs->objects.size() << " of " << scene.objects.size()
+       << " objects can be seen from " << reach->to_string() << " about the red dot (" << drawn
+       << " of them in this picture, " << 2 * args.radius << " m wide)</text>\n<text x=\"12\" y=\""
+       << kPixels + 48
+       << "\">tan: occluders; dark: shrunk occluders; grey-blue: shadow at eye height; green: the "
+          "PVS (outlines: large objects)</text></g>\n</svg>\n";
   picture.raw(tail.str());
   if (auto s = write_file_whole(args.out, picture.text()); !s) return s.error();
   std::cout << "written: " << args.out.string() << '\n';

@@ -12,6 +12,10 @@ struct Output {
   std::filesystem::path glb;
   std::filesystem::path path;
   bool json = false;
+  Status check() const {
+    if (auto s = check_output_file(glb); !s) return s;
+    return path.empty() ? ok() : check_output_file(path);
+  }
   void add_to(CLI::App& app) {
     app.add_option("-o,--output", glb, "scene file to write")->required()->type_name("OUT.glb");
     app.add_option("--path-out", path, "CSV to write a street walk to")->type_name("P.csv");
@@ -65,7 +69,10 @@ void add_generate(CLI::App& app, std::function<Outcome()>& action) {
   c->add_option("--relief", city->options.relief_m, "height of the ground's swells, metres")->capture_default_str();
   add_path_options(*c, city->options.path);
   c->callback([&action, city] {
-    action = [city] { return write(city->out, generate_city(city->options, make_context(city->out.json))); };
+    action = [city]() -> Outcome {
+      if (auto s = city->out.check(); !s) return s.error();
+      return write(city->out, generate_city(city->options, make_context(city->out.json)));
+    };
   });
 
   auto dress = std::make_shared<DressArgs>();
@@ -77,6 +84,7 @@ void add_generate(CLI::App& app, std::function<Outcome()>& action) {
   add_path_options(*d, dress->options.path);
   d->callback([&action, dress] {
     action = [dress]() -> Outcome {
+      if (auto s = dress->out.check(); !s) return s.error();
       const Context context = make_context(dress->out.json);
       const auto scene = dress->scene.load(context);
       if (!scene) return scene.error();

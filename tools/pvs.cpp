@@ -58,41 +58,44 @@ std::string row_name(std::size_t row) {
   return std::string(digits.size() < 5 ? 5 - digits.size() : 0, '0') + digits + ".txt";
 }
 
-Outcome along_path(const Args& args, const Scene& scene, const Method& method, const Reach& reach, const Context& context) {
-  const auto path = read_path(args.path);
-  if (!path) return path.error();
+Outcome along_path(const Args& args, const std::vector<Pose>& path, const Scene& scene,
+                   const Method& method, const Reach& reach, const Context& context) {
   if (!args.dump.empty()) {
     std::error_code ec;
     std::filesystem::create_directories(args.dump, ec);
     if (ec) return io_error("cannot make folder '" + args.dump.string() + "': " + ec.message());
   }
-  if (auto warm = method.solve({path->front().eye, reach}); !warm) return warm.error();
+  if (auto warm = method.solve({path.front().eye, reach}); !warm) return warm.error();
   Json poses = Json::array();
   std::vector<double> counts;
   std::vector<double> compute;
   std::vector<double> wall;
-  for (std::size_t row = 0; row < path->size(); ++row) {
+  for (std::size_t row = 0; row < path.size(); ++row) {
     if (context.stopped()) return cancelled();
-    const auto t = timed_solve(method, {(*path)[row].eye, reach});
+    const auto t = timed_solve(method, {path[row].eye, reach});
     if (!t) return t.error();
     counts.push_back(static_cast<double>(t->pvs.objects.size()));
     compute.push_back(t->compute_ms);
     wall.push_back(t->wall_ms);
-    poses.push_back({{"eye", to_json((*path)[row].eye)}, {"count", t->pvs.objects.size()}, {"compute_ms", t->compute_ms}});
+    poses.push_back({{"eye", to_json(path[row].eye)},
+                     {"count", t->pvs.objects.size()},
+                     {"compute_ms", t->compute_ms}});
     if (!args.dump.empty()) {
       std::string ids;
       for (const ObjectId id : t->pvs.objects) ids += std::to_string(id) + '\n';
       if (auto s = write_file_whole(args.dump / row_name(row), ids); !s) return s.error();
     }
-    context.report("poses", row + 1, path->size());
+    context.report("poses", row + 1, path.size());
   }
   if (args.json) {
     print({{"poses", poses}, {"count_median", median(counts)}, {"compute_ms_median", median(compute)},
            {"compute_ms_p99", percentile(compute, 0.99)}, {"wall_ms_median", median(wall)}});
     return kOk;
   }
-  std::cout << path->size() << " poses: median " << median(counts) << " of " << scene.objects.size() << " objects, median " << median(compute)
-            << " ms CPU (p99 " << percentile(compute, 0.99) << "), " << method.traits().name << ", " << to_string(method.traits().guarantee) << '\n';
+  std::cout << path.size() << " poses: median " << median(counts) << " of " << scene.objects.size()
+            << " objects, median " << median(compute) << " ms CPU (p99 "
+            << percentile(compute, 0.99) << "), " << method.traits().name << ", "
+            << to_string(method.traits().guarantee) << '\n';
   return kOk;
 }
 
@@ -105,14 +108,20 @@ Outcome run(const Args& args) {
     if (!eye) return eye.error();
     cell.eye = *eye;
   }
+  std::vector<Pose> path;
+  if (args.eye.empty()) {
+    auto poses = read_path(args.path);
+    if (!poses) return poses.error();
+    path = std::move(*poses);
+  }
+  if (!args.dump.empty())
+    if (auto s = check_output_folder(args.dump); !s) return s.error();
   const Context context = make_context(args.json);
-  const auto scene = args.scene.load(context);
-  if (!scene) return scene.error();
-  const auto occluders = args.solve.get_occluders(*scene, *reach, context);
-  if (!occluders) return occluders.error();
-  const auto method = args.solve.make(*scene, *occluders);
-  if (!method) return method.error();
-  return args.eye.empty() ? along_path(args, *scene, **method, *reach, context) : one_eye(args, *scene, **method, cell);
+  const auto prepared = prepare(args.scene, args.solve, *reach, context);
+  if (!prepared) return prepared.error();
+  const auto& [scene, occluders, method] = **prepared;
+  return args.eye.empty() ? along_path(args, path, scene, *method, *reach, context)
+                          : one_eye(args, scene, *method, cell);
 }
 
 }  // namespace

@@ -24,6 +24,7 @@ struct Args {
 Outcome run(const Args& args) {
   const auto reach = Reach::parse(args.reach);
   if (!reach) return reach.error();
+  if (auto s = check_output_file(args.out); !s) return s.error();
   Context context = make_context(args.json);
   context.threads = args.threads;
   ShrinkOptions options;

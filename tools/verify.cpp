@@ -76,16 +76,13 @@ Outcome verify_path(const Args& args, const Context& context) {
   if (!reach) return reach.error();
   const auto path = read_path(args.path);
   if (!path) return path.error();
-  const auto scene = args.scene.load(context);
-  if (!scene) return scene.error();
-  const auto occluders = args.solve.get_occluders(*scene, *reach, context);
-  if (!occluders) return occluders.error();
-  const auto method = args.solve.make(*scene, *occluders);
-  if (!method) return method.error();
-  const Verifier verifier(*scene, &*occluders, blockers(args));
+  const auto prepared = prepare(args.scene, args.solve, *reach, context);
+  if (!prepared) return prepared.error();
+  const auto& [scene, occluders, method] = **prepared;
+  const Verifier verifier(scene, &occluders, blockers(args));
   Summary summary;
   for (std::size_t row = 0; row < path->size(); row += args.stride) {
-    const auto pvs = (*method)->solve({(*path)[row].eye, *reach});
+    const auto pvs = method->solve({(*path)[row].eye, *reach});
     if (!pvs) return pvs.error();
     const auto report = verifier.check(*pvs, verify_options(args), without_progress(context));
     if (!report) return report.error();
@@ -99,6 +96,7 @@ Outcome verify_path(const Args& args, const Context& context) {
 Outcome verify_record(const Args& args, const Context& context) {
   const auto record = client::read_record(args.record);
   if (!record) return record.error();
+  if (auto s = args.solve.check_files(); !s) return s.error();
   const auto scene = args.scene.load(context);
   if (!scene) return scene.error();
   if (scene->hash != record->scene_hash)

@@ -28,6 +28,10 @@ void live_line(const WalkProgress& p) {
 }
 
 Outcome run(const Args& args) {
+  if (!args.reach.empty())
+    if (auto reach = Reach::parse(args.reach); !reach) return reach.error();
+  if (!args.record.empty())
+    if (auto s = check_output_file(args.record); !s) return s.error();
   const Context context = make_context(args.json);
   const auto path = read_path(args.path);
   if (!path) return path.error();

@@ -69,6 +69,10 @@ TEST(ToolWalk, ASilentAddressIsAConnectionErrorAndRecordsNothing) {
   const Ran ran = ivis({"walk", "--connect", "ipc://" + (town.folder / "nobody"), "--path",
                         town.path, "--record", record});
   EXPECT_EQ(ran.code, 4) << ran.errors;
+  for (const std::string& said :
+       {"ipc://" + (town.folder / "nobody"), std::string("no answer within"),
+        std::string("Is an ivisd running")})
+    EXPECT_NE(ran.errors.find(said), std::string::npos) << ran.errors;
   EXPECT_FALSE(std::filesystem::exists(record));
 }
 

@@ -110,6 +110,40 @@ TEST(ToolRefuses, InputErrorsWithCodeThree) {
   }
 }
 
+// A scene that is not there stands for one that takes minutes: it must not be asked for first.
+TEST(ToolRefuses, WhatNeedsNoSceneBeforeTheSceneIsLoaded) {
+  const SmallTown t;
+  const std::string& eye = SmallTown::kEye;
+  const std::string scene = t.folder / "later.glb";
+  const std::string nothing = t.folder / "nothing";
+  const std::string out = t.folder / "missing/out.svg";
+  const std::string dump = t.path + "/dump";  // in a file
+  expect_refused({"pvs", scene, "--eye", eye, "--reach", "disk:1"}, 2, "disk:1");
+  expect_refused({"pvs", scene, "--eye", "1;2;3", "--reach", "disc:1"}, 2, "1;2;3");
+  expect_refused({"pvs", scene, "--path", nothing, "--reach", "disc:1"}, 3, nothing);
+  expect_refused({"pvs", scene, "--path", t.path, "--reach", "disc:1", "--dump", dump}, 3, dump);
+  for (const std::string& occluders : {nothing, t.folder.path().string()}) {
+    expect_refused({"pvs", scene, "--eye", eye, "--reach", "disc:1", "--occluders", occluders}, 3,
+                   "'" + occluders + "'");
+    expect_refused(
+        {"verify", scene, "--path", t.path, "--reach", "disc:1", "--occluders", occluders}, 3,
+        "'" + occluders + "'");
+  }
+  expect_refused({"verify", scene, "--path", nothing, "--reach", "disc:1"}, 3, nothing);
+  expect_refused({"verify", scene, "--path", t.path, "--reach", "disk:1"}, 2, "disk:1");
+  expect_refused({"verify", scene, "--record", nothing}, 3, nothing);
+  expect_refused({"draw", scene, "--eye", eye, "--reach", "disc:1", "-o", out}, 3, out);
+  expect_refused({"shrink", scene, "--reach", "disc:1", "-o", out}, 3, out);
+  expect_refused({"shrink", scene, "--reach", "disk:1", "-o", nothing}, 2, "disk:1");
+  expect_refused({"shrink", scene, "--reach", "disc:1", "-o", nothing, "--path", nothing}, 3,
+                 "'" + nothing + "'");
+  expect_refused({"generate", "dress", scene, "-o", out}, 3, out);
+  expect_refused({"generate", "dress", scene, "-o", nothing, "--path-out", out}, 3, out);
+  const std::string nobody = "ipc://" + (t.folder / "nobody");
+  expect_refused({"walk", "--connect", nobody, "--path", t.path, "--reach", "disk:1"}, 2, "disk:1");
+  expect_refused({"walk", "--connect", nobody, "--path", t.path, "--record", out}, 3, out);
+}
+
 TEST(ToolRefuses, OccludersOfAnotherSceneOrASmallerReach) {
   const SmallTown t;
   const std::string file = t.folder / "town.ivo";
