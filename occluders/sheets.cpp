@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-#include "occluders/box_tree.h"
+#include "occluders/rect_tree.h"
 #include "occluders/clip.h"
 #include "occluders/distance_check.h"
 #include "occluders/fast_erosion.h"
@@ -168,7 +168,7 @@ std::vector<std::vector<std::size_t>> clusters(const std::vector<Box2>& boxes) {
       i = parent[i] = parent[parent[i]];
     return i;
   };
-  const BoxTree tree(boxes);
+  const RectTree tree(boxes);
   for (std::size_t i = 0; i < boxes.size(); ++i)
     tree.all(boxes[i], [&](std::uint32_t j) {
       if (boxes[j].overlaps(boxes[i])) parent[root(j)] = root(i);

@@ -122,7 +122,7 @@ TEST(ToolRefuses, WhatNeedsNoSceneBeforeTheSceneIsLoaded) {
   expect_refused({"pvs", scene, "--eye", "1;2;3", "--reach", "disc:1"}, 2, "1;2;3");
   expect_refused({"pvs", scene, "--path", nothing, "--reach", "disc:1"}, 3, nothing);
   expect_refused({"pvs", scene, "--path", t.path, "--reach", "disc:1", "--dump", dump}, 3, dump);
-  for (const std::string occluders : {nothing, t.folder.path().string()}) {
+  for (const std::string& occluders : {nothing, t.folder.path().string()}) {
     expect_refused({"pvs", scene, "--eye", eye, "--reach", "disc:1", "--occluders", occluders}, 3,
                    "'" + occluders + "'");
     expect_refused(
