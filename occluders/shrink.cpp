@@ -9,6 +9,7 @@
 #include "occluders/distance_check.h"
 #include "occluders/fuse.h"
 #include "occluders/ground.h"
+#include "occluders/height_field.h"
 #include "occluders/prisms.h"
 #include "occluders/progress.h"
 #include "occluders/simplify.h"
@@ -161,6 +162,8 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
     for (const ObjectId id : terrain->objects())
       is_ground[id] = true;
   }
+  for (const ObjectId id : add_height_field(scene, set, context))
+    is_ground[id] = true;
 
   std::vector<ObjectSolids> found(objects.size());
   {
