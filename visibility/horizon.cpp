@@ -12,6 +12,14 @@ constexpr double kKnown = 0.5 * static_cast<double>(HeightField::kNone);
 constexpr double kRelative = 1e-6;   // for the roundings of a slope
 constexpr double kSideSlack = 1e-5;  // of u: more than azimuths are rounded by
 constexpr std::size_t kFewestUnits = 16;
+// More than the lines a strip may span. At this size a double resolves 4e-6 of a line: kEdge is
+// more.
+constexpr std::int64_t kRaise = std::int64_t{1} << 34;
+constexpr double kEdge = 1e-5;
+constexpr double kTiny = 1e-9;  // for roundings of a cell's index
+// What a file may say of a field's cells and size; a field beyond is not drawn.
+constexpr double kLeastStepM = 1e-3;
+constexpr double kMostM = 1e7;
 
 float below(double v) {
   return std::nextafter(static_cast<float>(v), kNothing);
@@ -67,9 +75,10 @@ TerrainMap::TerrainMap(const HeightField& field, const Vec3& origin, std::uint32
                 static_cast<std::size_t>(r)] =
             least_[l.first + static_cast<std::size_t>(r) * static_cast<std::size_t>(l.columns) +
                    static_cast<std::size_t>(c)];
-  // Rows begin where a cell takes up a good part of a face, and end at the field's far side.
   const double nearest = 2 * std::max({field.step.x, field.step.y, 1.0});
   const double farthest = std::max(field.step.x * field.columns, field.step.y * field.rows);
+  if (!(std::min(field.step.x, field.step.y) >= kLeastStepM) || !(farthest <= kMostM)) return;
+  // Rows begin where a cell takes up a good part of a face, and end at the field's far side.
   base_ =
       std::bit_cast<std::int32_t>(std::exp2(static_cast<float>(std::ceil(std::log2(nearest))))) >>
       Horizon::kShift;
@@ -111,9 +120,8 @@ bool TerrainMap::draw_strip(const Face& face, double near, double far, double he
   const double eye_minor = (face.along_x ? face.eye.y : face.eye.x) / step_minor;
   const double a = eye_major + face.direction * near / step_major;
   const double b = eye_major + face.direction * far / step_major;
-  constexpr double kEdge = 1e-9;  // of a cell's index, for the roundings above
-  const double from = std::floor(std::min(a, b) * (1 - kEdge) - kEdge);
-  const double to = std::floor(std::max(a, b) * (1 + kEdge) + kEdge);
+  const double from = std::floor(std::min(a, b) * (1 - kTiny) - kTiny);
+  const double to = std::floor(std::max(a, b) * (1 + kTiny) + kTiny);
   const double reach = far * (1 + kSideSlack) / step_minor;
   const double first_line = std::max(0.0, std::floor(eye_minor - reach - kEdge));
   const double last_line =
@@ -133,30 +141,33 @@ bool TerrainMap::draw_strip(const Face& face, double near, double far, double he
   // running[2 g] is the slope so far, running[2 g + 1] is 0 while the run goes on.
   bool any = false;
   const double width = 2.0 / static_cast<double>(units);
+  const double by_near = (1 - kRelative) / near;
+  const double by_far = (1 + kRelative) / far;
+  // In lines from first_line on, raised so that truncation rounds down.
+  const double offset = eye_minor - first_line + static_cast<double>(kRaise);
+  const double near_lines = near / step_minor;
+  const double far_lines = far / step_minor;
   for (std::size_t g = 0; g < units; ++g) {
     if (running[2 * g + 1] != 0) continue;
     const double u0 = -1 + width * static_cast<double>(g) - kSideSlack;
-    const double u1 = -1 + width * static_cast<double>(g + 1) + kSideSlack;
-    const double s0 = std::min(u0 * near, u0 * far);
-    const double s1 = std::max(u1 * near, u1 * far);
-    const double lo = std::floor(eye_minor + (face.side > 0 ? s0 : -s1) / step_minor - kEdge);
-    const double hi = std::floor(eye_minor + (face.side > 0 ? s1 : -s0) / step_minor + kEdge);
-    if (!(lo >= first_line && hi <= last_line)) {
-      running[2 * g + 1] = 1;
-      continue;
+    const double u1 = u0 + width + 2 * kSideSlack;
+    const double s0 = u0 < 0 ? u0 * far_lines : u0 * near_lines;
+    const double s1 = u1 > 0 ? u1 * far_lines : u1 * near_lines;
+    const auto lo = static_cast<std::int64_t>(offset + (face.side > 0 ? s0 : -s1) - kEdge) - kRaise;
+    const auto hi = static_cast<std::int64_t>(offset + (face.side > 0 ? s1 : -s0) + kEdge) - kRaise;
+    float least = HeightField::kNone;
+    if (lo >= 0 && hi < static_cast<std::int64_t>(lines)) {
+      least = line[static_cast<std::size_t>(lo)];
+      for (auto i = lo + 1; i <= hi; ++i)
+        least = std::min(least, line[static_cast<std::size_t>(i)]);
     }
-    float least = std::numeric_limits<float>::infinity();
-    const auto end = static_cast<std::size_t>(hi - first_line);
-    for (auto i = static_cast<std::size_t>(lo - first_line); i <= end; ++i)
-      least = std::min(least, line[i]);
     if (static_cast<double>(least) < kKnown) {
       running[2 * g + 1] = 1;
       continue;
     }
     any = true;
     const double h = static_cast<double>(least) - height;
-    const double slope = h >= 0 ? h / near * (1 - kRelative) : h / far * (1 + kRelative);
-    running[2 * g] = std::max(running[2 * g], slope);
+    running[2 * g] = std::max(running[2 * g], h * (h >= 0 ? by_near : by_far));
   }
   return any;
 }

@@ -20,7 +20,7 @@ namespace ivis {
 class Horizon {
  public:
   static constexpr std::uint32_t kMostUnitsAFace = 256;
-  static constexpr int kMantissaBits = 6;    ///< of a row's distance: 64 rows an octave
+  static constexpr int kMantissaBits = 5;    ///< of a row's distance: 32 rows an octave
   static constexpr std::uint32_t kPad = 80;  ///< units repeated behind the last
   static constexpr int kShift = 23 - kMantissaBits;
 

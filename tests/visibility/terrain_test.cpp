@@ -113,9 +113,9 @@ TEST(TerrainInTheCullMap, OutsideTheFieldOrAtItsBorderNothingIsHidden) {
 TEST(TerrainInTheCullMap, AHoleLetsTheEyeSeeUnderTheGroundAndTheVerifierNoticesIfItDoesNot) {
   SceneBuilder b;
   b.add_mesh(grid(80, -200, 5, mesa,
-                  [](double x, double z) { return x > 10 && x < 20 && std::abs(z) < 15; }));
+                  [](double x, double z) { return x > 10 && x < 20 && std::abs(z) < 5; }));
   const ObjectId under = b.add_box({38, -6, -1}, {42, -3, 1}, OccluderTag::kNever);
-  const ObjectId behind = b.add_box({90, 1, 60}, {92, 3, 62}, OccluderTag::kNever);
+  const ObjectId behind = b.add_box({66, 1, 183}, {68, 3, 185}, OccluderTag::kNever);
   for (int i = 0; i < 200; ++i)
     b.add_box({-100 - i * 0.2, 1, i * 0.5}, {-99.9 - i * 0.2, 1.2, 0.2 + i * 0.5},
               OccluderTag::kNever);
@@ -135,18 +135,18 @@ TEST(TerrainInTheCullMap, AHoleLetsTheEyeSeeUnderTheGroundAndTheVerifierNoticesI
   EXPECT_GT(misses(scene, set, wrong), 0U);
 }
 
-// The claim is as tight as it can be: the mesa's edge lies 1.95 m, one cell, before the first row
-// of the horizon, and the cell's rim 2 m behind the eye.
+// The claim is as tight as it can be: the mesa's edge lies one cell, 1.85 m, before a row of the
+// horizon, what is looked at is far off, and the cell's rim is 2 m behind the eye.
 TEST(VerifierPower, FindsThatTerrainWasShrunkForAReachTenPercentTooSmall) {
-  constexpr double kStep = 1.95;
+  constexpr double kStep = 1.85;
   constexpr double kEdge = 12 - kStep - 1e-3;
   const auto height = [](double x, double) {
-    return x > kEdge - 0.1 && x < kEdge + 10 ? 20.0 : 0.0;
+    return x > kEdge - 0.1 && x < kEdge + 40 ? 20.0 : 0.0;
   };
   SceneBuilder b;
-  b.add_mesh(grid(112, kEdge - 60 * kStep, kStep, height, nowhere));
+  b.add_mesh(grid(240, kEdge - 120 * kStep, kStep, height, nowhere));
   for (int i = 0; i < 100; ++i) {
-    const Vec3 at{90, 130 + 0.1 * i, 0};
+    const Vec3 at{400, 500 + 1.2 * i, 0};
     b.add_box(at - 0.02, at + 0.02, OccluderTag::kNever);
   }
   const Scene scene = std::move(b).finish();
