@@ -10,6 +10,7 @@
 #include "occluders/fuse.h"
 #include "occluders/gate.h"
 #include "occluders/ground.h"
+#include "occluders/height_field.h"
 #include "occluders/prism_ladder.h"
 #include "occluders/prisms.h"
 #include "occluders/progress.h"
@@ -148,6 +149,8 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
     for (const ObjectId id : terrain->objects())
       is_ground[id] = true;
   }
+  for (const ObjectId id : add_height_field(scene, set, context))
+    is_ground[id] = true;
 
   std::vector<ObjectSolids> found(objects.size());
   {

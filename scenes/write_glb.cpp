@@ -128,6 +128,10 @@ Status check(const GlbScene& scene) {
     if (node.mesh >= scene.meshes.size())
       return invalid_argument(where + "mesh " + std::to_string(node.mesh) + ", expected below " +
                               std::to_string(scene.meshes.size()));
+    if (node.far_mesh != GlbNode::kNoMesh &&
+        (node.far_mesh >= scene.meshes.size() || scene.meshes[node.far_mesh].triangles() == 0))
+      return invalid_argument(where + "far mesh " + std::to_string(node.far_mesh) +
+                              ", expected one with triangles");
     for (int c = 0; c < 4; ++c)
       for (int r = 0; r < 4; ++r)
         if (!std::isfinite(node.to_world[c][r]))
@@ -235,6 +239,7 @@ Result<std::string> write_glb(const GlbScene& scene) {
   Json nodes = Json::array();
   Json roots = Json::array();
   bool instanced = false;
+  bool levels = false;
   for (const GlbNode& node : scene.nodes) {
     Json out{{"name", node.name}};
     if (scene.meshes[node.mesh].triangles() > 0) out["mesh"] = written[node.mesh];
@@ -252,6 +257,17 @@ Result<std::string> write_glb(const GlbScene& scene) {
       instanced = true;
     }
     roots.push_back(nodes.size());
+    if (node.far_mesh != GlbNode::kNoMesh) {
+      Json far = out;
+      far["name"] = node.name + "_far";
+      far["mesh"] = written[node.far_mesh];
+      out["extensions"]["MSFT_lod"] = {{"ids", {nodes.size() + 1}}};
+      out["extras"]["MSFT_screencoverage"] = {0.02, 0.0};
+      nodes.push_back(std::move(out));
+      nodes.push_back(std::move(far));
+      levels = true;
+      continue;
+    }
     nodes.push_back(std::move(out));
   }
 
@@ -261,6 +277,7 @@ Result<std::string> write_glb(const GlbScene& scene) {
     root["extensionsUsed"] = {"EXT_mesh_gpu_instancing"};
     root["extensionsRequired"] = {"EXT_mesh_gpu_instancing"};
   }
+  if (levels) root["extensionsUsed"].push_back("MSFT_lod");
   root["scene"] = 0;
   Json only_scene = Json::object();
   if (!roots.empty()) only_scene["nodes"] = std::move(roots);

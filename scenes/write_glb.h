@@ -47,6 +47,10 @@ struct GlbNode {
   Mat4 to_world{1};
   std::vector<GlbInstance>
       instances;  ///< none: one object; else EXT_mesh_gpu_instancing, one object each
+  /// Coarser mesh for far away, by MSFT_lod: a node of its own that no scene holds, so that it is
+  /// no object; kNoMesh for none.
+  std::uint32_t far_mesh = kNoMesh;
+  static constexpr std::uint32_t kNoMesh = 0xffffffffU;
 };
 
 /// What a GLB file is to hold: a flat list of nodes that share meshes.

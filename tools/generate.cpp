@@ -1,8 +1,11 @@
+#include <algorithm>
+#include <charconv>
 #include <iostream>
 #include <memory>
 
 #include "scenes/generate_city.h"
 #include "scenes/generate_dress.h"
+#include "scenes/generate_terrain.h"
 #include "tools/common.h"
 
 namespace ivis::tool {
@@ -12,13 +15,14 @@ struct Output {
   std::filesystem::path glb;
   std::filesystem::path path;
   bool json = false;
+  bool terrain = false;
   Status check() const {
     if (auto s = check_output_file(glb); !s) return s;
     return path.empty() ? ok() : check_output_file(path);
   }
   void add_to(CLI::App& app) {
     app.add_option("-o,--output", glb, "scene file to write")->required()->type_name("OUT.glb");
-    app.add_option("--path-out", path, "CSV to write a street walk to")->type_name("P.csv");
+    app.add_option("--path-out", path, terrain ? "CSV to write a flight to" : "CSV to write a street walk to")->type_name("P.csv");
     app.add_flag("--json", json, "print JSON");
   }
 };
@@ -31,7 +35,9 @@ Outcome write(const Output& out, const Result<GeneratedScene>& made) {
   if (out.json) {
     print({{"objects", made->objects}, {"triangles", made->triangles}, {"buildings", made->buildings}, {"poses", made->path.size()}, {"bytes", made->glb.size()}});
   } else {
-    std::cout << out.glb.string() << ": " << made->buildings << " buildings, " << made->objects << " objects, " << made->triangles << " triangles\n";
+    std::cout << out.glb.string() << ": ";
+    if (!out.terrain) std::cout << made->buildings << " buildings, ";
+    std::cout << made->objects << " objects, " << made->triangles << " triangles\n";
     if (!out.path.empty()) std::cout << out.path.string() << ": " << made->path.size() << " poses\n";
   }
   return kOk;
@@ -51,6 +57,51 @@ struct DressArgs {
   SceneArgs scene;
   DressOptions options;
 };
+struct TerrainArgs {
+  Output out;
+  std::filesystem::path dem;
+  std::string crop;
+  std::string crop_m;
+  std::size_t made_up = 0;
+  bool ragged = false;
+  double made_up_step = 10;
+  TerrainOptions options;
+};
+
+/// "A,B,...": exactly `n` numbers, none negative.
+template <class T>
+Result<std::vector<T>> numbers(const std::string& text, std::size_t n, const char* expected) {
+  std::vector<T> list;
+  const char* at = text.data();
+  const char* end = at + text.size();
+  while (at != end) {
+    T value{};
+    const auto parsed = std::from_chars(at, end, value);
+    if (parsed.ec != std::errc{} || !(value >= T{0}) || (parsed.ptr != end && *parsed.ptr != ',')) break;
+    list.push_back(value);
+    at = parsed.ptr == end ? end : parsed.ptr + 1;
+    if (at == end && *(end - 1) == ',') break;
+    if (at == end && list.size() == n) return list;
+  }
+  return invalid_argument("'" + text + "': expected " + expected);
+}
+
+Result<Dem> get_dem(const TerrainArgs& args, const Context& context) {
+  if (args.made_up > 0) return made_up_dem(args.made_up, args.made_up_step, args.options.seed, args.ragged);
+  DemCrop crop;
+  if (!args.crop.empty()) {
+    const auto v = numbers<std::size_t>(args.crop, 4, "COLUMN,ROW,COLUMNS,ROWS");
+    if (!v) return v.error();
+    crop.samples.emplace();
+    std::copy(v->begin(), v->end(), crop.samples->begin());
+  }
+  if (!args.crop_m.empty()) {
+    const auto v = numbers<double>(args.crop_m, 2, "EAST-WEST,NORTH-SOUTH in metres");
+    if (!v) return v.error();
+    crop.metres = Vec2{(*v)[0], (*v)[1]};
+  }
+  return read_dem(args.dem, crop, context);
+}
 
 }  // namespace
 
@@ -89,6 +140,36 @@ void add_generate(CLI::App& app, std::function<Outcome()>& action) {
       const auto scene = dress->scene.load(context);
       if (!scene) return scene.error();
       return write(dress->out, generate_dress(*scene, dress->options, context));
+    };
+  });
+
+  auto terrain = std::make_shared<TerrainArgs>();
+  terrain->out.terrain = true;
+  CLI::App* t = sub->add_subcommand("terrain", "measured heights -> terrain in tiles, trees, and a flight over it");
+  auto* dem = t->add_option("DEM", terrain->dem, "GeoTIFF, ESRI ASCII grid (.asc) or SRTM .hgt; needs a build with GDAL");
+  terrain->out.add_to(*t);
+  auto* crop = t->add_option("--crop", terrain->crop, "part of the grid, counted in heights from the north-west corner")->type_name("COL,ROW,COLUMNS,ROWS");
+  auto* crop_m = t->add_option("--crop-m", terrain->crop_m, "metres east-west and north-south about the grid's middle, to whole cells")->type_name("W,H")->excludes(crop);
+  t->add_option("--made-up", terrain->made_up, "no file: SIZE x SIZE cells of hills made up from the seed")->type_name("SIZE")->excludes(dem)->excludes(crop)->excludes(crop_m)->check(CLI::Range(4, 4096));
+  t->add_option("--made-up-step", terrain->made_up_step, "metres a cell of made-up hills")->capture_default_str()->check(number_within(0.1, 1000));
+  t->add_flag("--ragged", terrain->ragged, "made-up hills with a slanted border and holes");
+  t->add_option("--seed", terrain->options.seed, "of trees, flight and made-up hills")->capture_default_str()->check(CLI::NonNegativeNumber);
+  t->add_option("--tile", terrain->options.tile_cells, "cells a side of a tile")->capture_default_str()->check(CLI::Range(1, 1024));
+  auto* trees = t->add_option("--trees", terrain->options.trees, "trees, one object each")->capture_default_str()->check(CLI::NonNegativeNumber);
+  t->add_option("--triangles", terrain->options.triangles, "aimed at in all, by the number of trees")->check(CLI::NonNegativeNumber)->excludes(trees);
+  t->add_option("--copyright", terrain->options.copyright, "for asset.copyright: who measured the heights");
+  FlyoverOptions& flight = terrain->options.path;
+  t->add_option("--poses", flight.poses, "poses of the flight")->capture_default_str()->check(CLI::Range(2, 1000000));
+  t->add_option("--step", flight.step_m, "metres between poses; the default is 200 m/s at 60 Hz")->capture_default_str()->check(number_within(0.01, 1000));
+  t->add_option("--speed", flight.speed_m_s, "metres a second, for the column t")->capture_default_str()->check(number_within(0.01, 10000));
+  t->add_option("--height", flight.height_m, "metres above the highest ground near by")->capture_default_str()->check(number_within(1, 10000));
+  t->callback([&action, terrain] {
+    if (terrain->dem.empty() && terrain->made_up == 0) throw CLI::RequiredError("DEM or --made-up");
+    action = [terrain]() -> Outcome {
+      const Context context = make_context(terrain->out.json);
+      const auto heights = get_dem(*terrain, context);
+      if (!heights) return heights.error();
+      return write(terrain->out, generate_terrain(*heights, terrain->options, context));
     };
   });
 }

@@ -43,7 +43,8 @@ Outcome run(const Args& args) {
   const auto shrunk = shrink(*scene, options, *eroder, context);
   if (!shrunk) return shrunk.error();
   if (auto s = write_occluders(args.out, shrunk->set); !s) return s.error();
-  if (shrunk->set.shrunk.empty() && shrunk->set.solid_pieces.empty() && shrunk->set.sheets.empty()) std::cerr << "warning: no occluder is left for this reach: every PVS will list everything\n";
+  if (shrunk->set.shrunk.empty() && shrunk->set.solid_pieces.empty() && shrunk->set.sheets.empty() && shrunk->set.height_field.empty())
+    std::cerr << "warning: no occluder is left for this reach: every PVS will list everything\n";
   const ShrinkReport& r = shrunk->report;
   if (args.json) {
     Json left_out = Json::object();

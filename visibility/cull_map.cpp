@@ -66,6 +66,7 @@ struct CullMap::Eye {
 struct CullMap::Scratch {
   explicit Scratch(std::uint32_t bins_a_face) : polar(bins_a_face) {}
   PolarMap polar;
+  Horizon horizon;
   OrthographicMap::Heights heights;
   std::vector<std::uint32_t> visible;
   std::vector<std::uint64_t> bits;
@@ -98,6 +99,8 @@ CullMap::CullMap(const Scene& scene, const OccluderSet& occluders, const MethodO
     all_grounded_ = all_grounded_ && s.grounded;
     all_held_down_ = all_held_down_ && (s.floored || s.grounded);
   }
+  if (options.map == CullMapKind::kPolar && !occluders.height_field.empty())
+    terrain_ = std::make_unique<TerrainMap>(occluders.height_field, origin_, bins_a_face);
   if (options.map == CullMapKind::kOrthographic) {
     Aabb bounds{scene.bounds.lo - origin_, scene.bounds.hi - origin_};
     if (scene.bounds.empty()) bounds = {};
@@ -219,6 +222,11 @@ std::vector<std::uint32_t> CullMap::largest_solids(const Eye& eye) const {
 
 void CullMap::find_polar(const Eye& eye, Scratch& scratch, Stats& stats) const {
   scratch.polar.clear();
+  scratch.polar.set_horizon(nullptr);
+  if (terrain_) {
+    terrain_->draw(eye.single, scratch.horizon);
+    if (!scratch.horizon.empty()) scratch.polar.set_horizon(&scratch.horizon);
+  }
   draw_walls(walls_, eye.single, eye.floors, largest_solids(eye), guards_, scratch.polar, stats.polar);
   scratch.polar.finish(eye.floors.undersides);
   if (objects_.nodes.empty()) return;

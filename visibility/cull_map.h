@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "visibility/box_tree.h"
+#include "visibility/horizon.h"
 #include "visibility/method.h"
 #include "visibility/orthographic_map.h"
 #include "visibility/polar_map.h"
@@ -12,7 +13,8 @@
 
 namespace ivis {
 
-/// The cull map: shrunk prisms throw shadows over a 2.5D scene; what lies in them is hidden.
+/// The cull map: shrunk prisms and terrain throw shadows over a 2.5D scene; what lies in them is hidden.
+/// The orthographic map draws no terrain: it lists what only terrain hides.
 /// Guarantee: conservative: an object seen from anywhere in the cell is never left out.
 /// Errors:    kInvalidArgument if the cell's reach is larger than the occluders were shrunk for.
 /// Threads:   solve() is const and reentrant; the result does not depend on options.threads.
@@ -67,6 +69,7 @@ class CullMap : public Method {
   std::vector<ObjectId> always_visible_;
   SolidIndex solids_;
   std::unique_ptr<OrthographicMap> orthographic_;
+  std::unique_ptr<TerrainMap> terrain_;
   mutable std::mutex scratch_mutex_;
   mutable std::vector<std::unique_ptr<Scratch>> scratch_;
 };

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 #include "core/assert.h"
 
@@ -54,6 +55,18 @@ HWY_INLINE V azimuth(D d, V x, V z) {
   return hn::Add(base, hn::Div(minor, major));
 }
 
+/// Calls f with the two constants that a solve's functions are made for.
+template <class F>
+void choose(bool undersides, const PolarMap& map, const F& f) {
+  constexpr std::bool_constant<true> kYes;
+  constexpr std::bool_constant<false> kNo;
+  if (map.horizon() == nullptr) {
+    undersides ? f(kYes, kNo) : f(kNo, kNo);
+  } else {
+    undersides ? f(kYes, kYes) : f(kNo, kYes);
+  }
+}
+
 /// What the boxes of one node look like from the eye.
 struct Seen {
   alignas(64) float high[kW];  ///< largest slope
@@ -61,6 +74,7 @@ struct Seen {
   alignas(64) float near[kW];  ///< largest 1/w
   alignas(64) std::int32_t first[kW];  ///< first bin, in [0, bins)
   alignas(64) std::int32_t last[kW];   ///< last bin, >= first, may pass `bins`
+  alignas(64) std::int32_t row[kW];    ///< of the horizon: none farther than the box
 };
 
 struct View {
@@ -68,10 +82,11 @@ struct View {
   float to_bins;  ///< bins a unit of t
   float slack;    ///< in bins
   std::int32_t bins;
+  const Horizon* horizon = nullptr;
 };
 
 /// Projects the boxes of a node. Returns the mask of children whose plan holds the eye (always visible).
-template <bool kUndersides>
+template <bool kUndersides, bool kTerrain>
 HWY_INLINE std::uint32_t project(const BoxTree::Node& node, const View& view, Seen& seen) {
   const D d;
   const DI di;
@@ -96,6 +111,12 @@ HWY_INLINE std::uint32_t project(const BoxTree::Node& node, const View& view, Se
     const V one = hn::Set(d, 1.0F);
     const V guard = hn::Set(d, 1.0F + kRelative);
     hn::Store(hn::Mul(hn::Div(one, safe_near), guard), d, seen.near + l);
+    if constexpr (kTerrain) {
+      // Rows are floats of few mantissa bits: the row of a distance is what is left of its own bits.
+      const auto bits = hn::BitCast(di, hn::Mul(safe_near, hn::Set(d, 1.0F - kRelative)));
+      const auto row = hn::Sub(hn::ShiftRight<Horizon::kShift>(bits), hn::Set(di, view.horizon->first_row()));
+      hn::Store(hn::Min(hn::Max(row, hn::Zero(di)), hn::Set(di, view.horizon->last_row())), di, seen.row + l);
+    }
     const V high = hn::Div(y1, hn::IfThenElse(hn::Gt(y1, zero), safe_near, far));
     hn::Store(hn::Add(high, hn::Mul(hn::Abs(high), hn::Set(d, kRelative))), d, seen.high + l);
     if constexpr (kUndersides) {
@@ -136,7 +157,7 @@ HWY_INLINE std::uint32_t holds_eye(const BoxTree::Node& node, const View& view) 
 }
 
 /// Does one bin hide every box of the node? Bit i: bin `at[i]` hides box i.
-template <bool kUndersides>
+template <bool kUndersides, bool kTerrain>
 HWY_INLINE std::uint32_t hidden_in_bin(const PolarMap& map, const Seen& seen, const std::int32_t* at) {
   const D d;
   const DI di;
@@ -146,11 +167,21 @@ HWY_INLINE std::uint32_t hidden_in_bin(const PolarMap& map, const Seen& seen, co
     const V high = hn::Load(d, seen.high + l);
     const V near = hn::Load(d, seen.near + l);
     M hidden = hn::Lt(high, high);
+    V low = high;
+    if constexpr (kUndersides) low = hn::Load(d, seen.low + l);
+    if constexpr (kTerrain) {
+      const Horizon& horizon = *map.horizon();
+      const auto stride = hn::Set(di, static_cast<std::int32_t>(horizon.stride()));
+      const auto unit = hn::ShiftRightSame(index, horizon.unit_shift());
+      const V slope = hn::GatherIndex(d, horizon.slopes(), hn::Add(hn::Mul(hn::Load(di, seen.row + l), stride), unit));
+      hidden = hn::Le(high, slope);
+      // Slopes up to the horizon are hidden by it: a wall need reach down to there only.
+      if constexpr (kUndersides) low = hn::Max(low, slope);
+    }
     for (std::uint32_t k = 0; k < kLayers; ++k) {
       M m = hn::Le(high, hn::GatherIndex(d, map.slope(k), index));
       m = hn::And(m, hn::Le(near, hn::GatherIndex(d, map.near_inverse(k), index)));
-      if constexpr (kUndersides)
-        m = hn::And(m, hn::Ge(hn::Load(d, seen.low + l), hn::GatherIndex(d, map.low(k), index)));
+      if constexpr (kUndersides) m = hn::And(m, hn::Ge(low, hn::GatherIndex(d, map.low(k), index)));
       hidden = hn::Or(hidden, m);
     }
     bits |= bits_of(d, hidden) << l;
@@ -160,10 +191,12 @@ HWY_INLINE std::uint32_t hidden_in_bin(const PolarMap& map, const Seen& seen, co
 
 struct Box {
   float high, low, near;
+  const float* horizon;  ///< slopes of the row no farther than the box; with terrain only
+  int shift;             ///< of its units
 };
 
 /// Bit i: element `at + i` of the planes (S, W, B a layer, `stride` apart) hides the box; for i in [0, 16).
-template <bool kUndersides>
+template <bool kUndersides, bool kTerrain>
 HWY_INLINE std::uint32_t hidden_in_16(const float* planes, std::size_t stride, std::size_t at, const Box& box) {
   const D d;
   std::uint32_t bits = 0;
@@ -171,11 +204,19 @@ HWY_INLINE std::uint32_t hidden_in_16(const float* planes, std::size_t stride, s
   const V near = hn::Set(d, box.near);
   for (std::uint32_t l = 0; l < kW; l += static_cast<std::uint32_t>(hn::Lanes(d))) {
     M hidden = hn::Lt(high, high);
+    V low = hn::Set(d, box.low);
+    if constexpr (kTerrain) {
+      const DI di;
+      const auto bin = hn::Iota(di, static_cast<std::int32_t>(at) + static_cast<std::int32_t>(l));
+      const V slope = hn::GatherIndex(d, box.horizon, hn::ShiftRightSame(bin, box.shift));
+      hidden = hn::Le(high, slope);
+      low = hn::Max(low, slope);
+    }
     const float* p = planes + at + l;
     for (std::uint32_t k = 0; k < kLayers; ++k, p += 3 * stride) {
       M m = hn::Le(high, hn::LoadU(d, p));
       m = hn::And(m, hn::Le(near, hn::LoadU(d, p + stride)));
-      if constexpr (kUndersides) m = hn::And(m, hn::Ge(hn::Set(d, box.low), hn::LoadU(d, p + 2 * stride)));
+      if constexpr (kUndersides) m = hn::And(m, hn::Ge(low, hn::LoadU(d, p + 2 * stride)));
       hidden = hn::Or(hidden, m);
     }
     bits |= bits_of(d, hidden) << l;
@@ -184,53 +225,62 @@ HWY_INLINE std::uint32_t hidden_in_16(const float* planes, std::size_t stride, s
 }
 
 /// Do all bins first..last, none of which wraps, hide the box? `coarse`: the coarse minima are up to date.
-template <bool kUndersides>
+template <bool kUndersides, bool kTerrain>
 HWY_INLINE bool hidden_in_run(const PolarMap& map, const Box& box, std::int32_t first, std::int32_t last, bool coarse) {
   const float* planes = map.slope(0);
   const std::size_t stride = map.stride();
   std::int32_t at = first;
   while (at + 16 <= last + 1) {
-    if (coarse && at % 16 == 0) {
+    if (!kTerrain && coarse && at % 16 == 0) {  // the coarse minima know no terrain
       // Sixteen blocks at once by their minima; a block that fails is looked at bin by bin.
       const std::int32_t blocks = std::min(16, (last + 1 - at) / 16);
       const std::uint32_t want = blocks == 16 ? 0xffffU : ((1U << blocks) - 1U);
-      std::uint32_t fails = want & ~hidden_in_16<kUndersides>(map.coarse(), map.coarse_stride(), static_cast<std::size_t>(at / 16), box);
+      std::uint32_t fails = want & ~hidden_in_16<kUndersides, kTerrain>(map.coarse(), map.coarse_stride(), static_cast<std::size_t>(at / 16), box);
       for (; fails != 0; fails &= fails - 1) {
         const std::int32_t bin = at + 16 * std::countr_zero(fails);
-        if (hidden_in_16<kUndersides>(planes, stride, static_cast<std::size_t>(bin), box) !=
-            0xffffU)
+        if (hidden_in_16<kUndersides, kTerrain>(planes, stride, static_cast<std::size_t>(bin), box) != 0xffffU)
           return false;
       }
       at += 16 * blocks;
       continue;
     }
-    if (hidden_in_16<kUndersides>(planes, stride, static_cast<std::size_t>(at), box) != 0xffffU) return false;
-    at += coarse ? 16 - at % 16 : 16;
+    if (hidden_in_16<kUndersides, kTerrain>(planes, stride, static_cast<std::size_t>(at), box) != 0xffffU) return false;
+    at += coarse && !kTerrain ? 16 - at % 16 : 16;
   }
   if (at > last) return true;
   const std::uint32_t want = (1U << (last - at + 1)) - 1U;
-  return (hidden_in_16<kUndersides>(planes, stride, static_cast<std::size_t>(at), box) & want) == want;
+  return (hidden_in_16<kUndersides, kTerrain>(planes, stride, static_cast<std::size_t>(at), box) & want) == want;
 }
 
 /// Do all bins first..last hide the box? Up to 16 bins never wrap, thanks to the pad.
-template <bool kUndersides>
+template <bool kUndersides, bool kTerrain>
 HWY_INLINE bool hidden_in_all(const PolarMap& map, const Box& box, std::int32_t first, std::int32_t last, bool coarse) {
   const auto bins = static_cast<std::int32_t>(map.bins());
   if (last - first < 16) {
     const std::uint32_t want = (2U << (last - first)) - 1U;
-    return (hidden_in_16<kUndersides>(map.slope(0), map.stride(), static_cast<std::size_t>(first), box) & want) == want;
+    return (hidden_in_16<kUndersides, kTerrain>(map.slope(0), map.stride(), static_cast<std::size_t>(first), box) & want) == want;
   }
-  if (last < bins) return hidden_in_run<kUndersides>(map, box, first, last, coarse);
-  return hidden_in_run<kUndersides>(map, box, first, bins - 1, coarse) &&
-         hidden_in_run<kUndersides>(map, box, 0, std::min(last - bins, bins - 1), coarse);
+  if (last < bins) return hidden_in_run<kUndersides, kTerrain>(map, box, first, last, coarse);
+  return hidden_in_run<kUndersides, kTerrain>(map, box, first, bins - 1, coarse) &&
+         hidden_in_run<kUndersides, kTerrain>(map, box, 0, std::min(last - bins, bins - 1), coarse);
+}
+
+template <bool kUndersides, bool kTerrain>
+HWY_INLINE Box box_of(const View& view, const Seen& seen, std::uint32_t c) {
+  Box box{seen.high[c], kUndersides ? seen.low[c] : 0.0F, seen.near[c], nullptr, 0};
+  if constexpr (kTerrain) {
+    box.horizon = view.horizon->row(seen.row[c]);
+    box.shift = view.horizon->unit_shift();
+  }
+  return box;
 }
 
 /// Mask of the node's children that the map does not hide.
-template <bool kUndersides>
+template <bool kUndersides, bool kTerrain>
 HWY_INLINE std::uint32_t visible_children(const BoxTree::Node& node, const View& view, const PolarMap& map, bool coarse,
                                           Seen& seen) {
   const std::uint32_t used = node.count == kW ? 0xffffU : ((1U << node.count) - 1U);
-  const std::uint32_t around = project<kUndersides>(node, view, seen);
+  const std::uint32_t around = project<kUndersides, kTerrain>(node, view, seen);
   // One bin in the middle settles most visible boxes.
   alignas(64) std::int32_t middle[kW];
   const DI di;
@@ -238,11 +288,11 @@ HWY_INLINE std::uint32_t visible_children(const BoxTree::Node& node, const View&
   for (std::uint32_t l = 0; l < kW; l += static_cast<std::uint32_t>(hn::Lanes(di)))
     hn::Store(hn::And(hn::ShiftRight<1>(hn::Add(hn::Load(di, seen.first + l), hn::Load(di, seen.last + l))), wrap), di,
               middle + l);
-  std::uint32_t open = used & hidden_in_bin<kUndersides>(map, seen, middle) & ~around;
+  std::uint32_t open = used & hidden_in_bin<kUndersides, kTerrain>(map, seen, middle) & ~around;
   std::uint32_t visible = used & ~open;
   for (; open != 0; open &= open - 1) {
     const auto c = static_cast<std::uint32_t>(std::countr_zero(open));
-    if (!hidden_in_all<kUndersides>(map, {seen.high[c], seen.low[c], seen.near[c]}, seen.first[c], seen.last[c], coarse))
+    if (!hidden_in_all<kUndersides, kTerrain>(map, box_of<kUndersides, kTerrain>(view, seen, c), seen.first[c], seen.last[c], coarse))
       visible |= 1U << c;
   }
   return visible;
@@ -324,7 +374,7 @@ struct Corners {
 /// corners and face borders. A bin [i, i+1] is written when the chain covers it whole, with the least and largest
 /// k over [i - slack, i+1 + slack]: so neither an azimuth wrong by `slack` nor a corner next to a bin's
 /// border can make a statement too strong.
-template <bool kUndersides>
+template <bool kUndersides, bool kTerrain>
 class WallPainter {
  public:
   WallPainter(PolarMap& map, const View& view, const PolarGuards& guards, PolarStats& stats)
@@ -429,7 +479,11 @@ class WallPainter {
     for (const float k : chain_k_) largest = std::max(largest, k);
     float least = kInf;
     for (const float k : chain_k_) least = std::min(least, k);
-    const Box box{height.top * (height.top > 0 ? largest : least), height.bottom * (height.bottom > 0 ? least : largest), largest};
+    Box box{height.top * (height.top > 0 ? largest : least), height.bottom * (height.bottom > 0 ? least : largest), largest, nullptr, 0};
+    if constexpr (kTerrain) {
+      box.horizon = view_.horizon->row(view_.horizon->row_at((1.0F - kRelative) / largest));
+      box.shift = view_.horizon->unit_shift();
+    }
     auto first = static_cast<std::int32_t>(chain_t_.front());
     auto last = static_cast<std::int32_t>(chain_t_.back());
     if (last - first >= view_.bins) return false;
@@ -437,7 +491,7 @@ class WallPainter {
       first -= view_.bins;
       last -= view_.bins;
     }
-    return hidden_in_all<kUndersides>(map_, box, first, last, false);
+    return hidden_in_all<kUndersides, kTerrain>(map_, box, first, last, false);
   }
 
   void draw_chain(const Height& height) {
@@ -543,14 +597,14 @@ class WallPainter {
 
 View make_view(const float eye[3], const PolarMap& map) {
   return {eye[0], eye[1], eye[2], static_cast<float>(map.bins()) / 8.0F, bin_slack(map.bins()),
-          static_cast<std::int32_t>(map.bins())};
+          static_cast<std::int32_t>(map.bins()), map.horizon()};
 }
 
-template <bool kUndersides>
+template <bool kUndersides, bool kTerrain>
 void draw(const WallSet& walls, const float eye[3], const Floors& floors, std::span<const std::uint32_t> only, const PolarGuards& guards,
           PolarMap& map, PolarStats& stats) {
   const View view = make_view(eye, map);
-  WallPainter<kUndersides> painter(map, view, guards, stats);
+  WallPainter<kUndersides, kTerrain> painter(map, view, guards, stats);
   const auto paint = [&](std::uint32_t s) {
     const WallSet::Solid& solid = walls.solids[s];
     const bool down = (solid.floored && floors.above_floor) || (solid.grounded && floors.on_ground);
@@ -575,7 +629,7 @@ void draw(const WallSet& walls, const float eye[3], const Floors& floors, std::s
     const Pending p = stack.back();
     stack.pop_back();
     // What was drawn since it was pushed may hide it now.
-    if (p.last >= p.first && hidden_in_all<kUndersides>(map, p.box, p.first, p.last, false)) continue;
+    if (p.last >= p.first && hidden_in_all<kUndersides, kTerrain>(map, p.box, p.first, p.last, false)) continue;
     if ((p.child & BoxTree::kItem) != 0) {
       paint(p.child & ~BoxTree::kItem);
       continue;
@@ -583,13 +637,13 @@ void draw(const WallSet& walls, const float eye[3], const Floors& floors, std::s
     const BoxTree::Node& node = walls.tree.nodes[p.child];
     ++stats.nodes_tested;
     stats.solids_tested += node.count;
-    std::uint32_t visible = visible_children<kUndersides>(node, view, map, false, seen);
+    std::uint32_t visible = visible_children<kUndersides, kTerrain>(node, view, map, false, seen);
     const std::uint32_t around = holds_eye(node, view);
     const std::size_t begin = stack.size();
     for (; visible != 0; visible &= visible - 1) {
       const auto c = static_cast<std::uint32_t>(std::countr_zero(visible));
       const bool open = ((around >> c) & 1U) != 0;
-      stack.push_back({open ? kInf : seen.near[c], node.child[c], {seen.high[c], kUndersides ? seen.low[c] : 0.0F, seen.near[c]},
+      stack.push_back({open ? kInf : seen.near[c], node.child[c], box_of<kUndersides, kTerrain>(view, seen, c),
                        open ? 0 : seen.first[c], open ? -1 : seen.last[c]});
     }
     std::sort(stack.begin() + static_cast<std::ptrdiff_t>(begin), stack.end(), [](const Pending& a, const Pending& b) {
@@ -599,11 +653,11 @@ void draw(const WallSet& walls, const float eye[3], const Floors& floors, std::s
 }
 
 /// Tests the children of one node; hands visible items and nodes on.
-template <bool kUndersides, class OnItem, class OnNode>
+template <bool kUndersides, bool kTerrain, class OnItem, class OnNode>
 HWY_INLINE void step(const BoxTree::Node& node, const View& view, const PolarMap& map, Seen& seen, PolarStats& stats,
                      const OnItem& on_item, const OnNode& on_node) {
   ++stats.nodes_tested;
-  for (std::uint32_t m = visible_children<kUndersides>(node, view, map, true, seen); m != 0; m &= m - 1) {
+  for (std::uint32_t m = visible_children<kUndersides, kTerrain>(node, view, map, true, seen); m != 0; m &= m - 1) {
     const std::uint32_t child = node.child[static_cast<std::uint32_t>(std::countr_zero(m))];
     if ((child & BoxTree::kItem) != 0) {
       on_item(child & ~BoxTree::kItem);
@@ -613,15 +667,15 @@ HWY_INLINE void step(const BoxTree::Node& node, const View& view, const PolarMap
   }
 }
 
-template <bool kUndersides>
+template <bool kUndersides, bool kTerrain>
 void find_children(const BoxTree& tree, std::uint32_t root, const float eye[3], const PolarMap& map,
                    std::vector<std::uint32_t>& visible, std::vector<std::uint32_t>& nodes, PolarStats& stats) {
   Seen seen;
-  step<kUndersides>(tree.nodes[root], make_view(eye, map), map, seen, stats, [&](std::uint32_t i) { visible.push_back(i); },
+  step<kUndersides, kTerrain>(tree.nodes[root], make_view(eye, map), map, seen, stats, [&](std::uint32_t i) { visible.push_back(i); },
                     [&](std::uint32_t n) { nodes.push_back(n); });
 }
 
-template <bool kUndersides>
+template <bool kUndersides, bool kTerrain>
 void find(const BoxTree& tree, std::uint32_t root, const float eye[3], const PolarMap& map, std::vector<std::uint32_t>& visible,
           PolarStats& stats) {
   const View view = make_view(eye, map);
@@ -631,26 +685,24 @@ void find(const BoxTree& tree, std::uint32_t root, const float eye[3], const Pol
   Seen seen;
   while (size != 0) {
     const BoxTree::Node& node = tree.nodes[stack[--size]];
-    step<kUndersides>(node, view, map, seen, stats, [&](std::uint32_t i) { visible.push_back(i); },
+    step<kUndersides, kTerrain>(node, view, map, seen, stats, [&](std::uint32_t i) { visible.push_back(i); },
                       [&](std::uint32_t n) { stack[size++] = n; });
   }
 }
 
 void find_children_target(const BoxTree& tree, std::uint32_t root, const float* eye, bool undersides, const PolarMap& map,
                           std::vector<std::uint32_t>& visible, std::vector<std::uint32_t>& nodes, PolarStats& stats) {
-  undersides ? find_children<true>(tree, root, eye, map, visible, nodes, stats)
-             : find_children<false>(tree, root, eye, map, visible, nodes, stats);
+  choose(undersides, map, [&](auto u, auto t) { find_children<u, t>(tree, root, eye, map, visible, nodes, stats); });
 }
 
 void draw_walls_target(const WallSet& walls, const float* eye, const Floors& floors, std::span<const std::uint32_t> only,
                        const PolarGuards& guards, PolarMap& map, PolarStats& stats) {
-  floors.undersides ? draw<true>(walls, eye, floors, only, guards, map, stats)
-                    : draw<false>(walls, eye, floors, only, guards, map, stats);
+  choose(floors.undersides, map, [&](auto u, auto t) { draw<u, t>(walls, eye, floors, only, guards, map, stats); });
 }
 
 void find_visible_target(const BoxTree& tree, std::uint32_t root, const float* eye, bool undersides, const PolarMap& map,
                          std::vector<std::uint32_t>& visible, PolarStats& stats) {
-  undersides ? find<true>(tree, root, eye, map, visible, stats) : find<false>(tree, root, eye, map, visible, stats);
+  choose(undersides, map, [&](auto u, auto t) { find<u, t>(tree, root, eye, map, visible, stats); });
 }
 
 // A block's statement in layer k is the weakest of its bins' statements in layer k: it holds for all of them.

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "visibility/box_tree.h"
+#include "visibility/horizon.h"
 
 namespace ivis {
 
@@ -40,6 +41,9 @@ struct WallSet {
 /// 1/w <= W is behind the wall: the segment from the eye meets the shrunk solid no farther than the
 /// point. Any statement may be dropped; statements are sorted by falling S.
 ///
+/// Terrain speaks beside the bins, by a Horizon: of each azimuth and distance, a slope below which all is
+/// hidden. A statement of a bin and the horizon block their union: a wall's low end may lie under the horizon.
+///
 /// Source:  Wonka, Wimmer, Sillion 2001, section 5.1 (cull map). Departs: polar instead of
 ///          orthographic, several layers a bin, real undersides.
 /// Threads: one writer; readers only after finish().
@@ -68,6 +72,9 @@ class PolarMap {
   const float* slope(std::uint32_t layer) const { return data_[0].v + layer * std::size_t{3} * stride_; }
   const float* near_inverse(std::uint32_t layer) const { return slope(layer) + stride_; }
   const float* low(std::uint32_t layer) const { return slope(layer) + 2 * std::size_t{stride_}; }
+  /// Terrain for the solve at hand; null for none. Borrowed; set it before anything is drawn or asked.
+  void set_horizon(const Horizon* horizon) { horizon_ = horizon; }
+  const Horizon* horizon() const { return horizon_; }
   float* coarse() { return coarse_[0].v; }
   const float* coarse() const { return coarse_[0].v; }
   std::uint32_t coarse_stride() const { return coarse_stride_; }
@@ -76,6 +83,7 @@ class PolarMap {
   std::uint32_t bins_;
   std::uint32_t stride_;         ///< floats a plane: bins + pad, a multiple of 16 off powers of two
   std::uint32_t coarse_stride_;  ///< floats a coarse plane
+  const Horizon* horizon_ = nullptr;
   struct alignas(64) Line {
     float v[16];
   };

@@ -140,33 +140,96 @@ bool FreeSpace::inside_closed_piece(const Object& o, const Vec3& p) const {
   return std::find(odd.begin(), odd.end(), true) != odd.end();
 }
 
-bool FreeSpace::below(const Object& o, const Vec3& p) const {
-  const std::vector<bool> opaque = opaque_triangles(scene_.mesh_of(o));
-  bool odd = false;
-  for (std::size_t t = 0; t < opaque.size(); ++t)
-    if (opaque[t] && above(world_triangle(scene_, o, t), p)) odd = !odd;
-  return odd;
+bool FreeSpace::below(const Group& group, const Vec3& p) const {
+  for (const Object* o : group) {
+    if (p.x < o->bounds.lo.x || p.x > o->bounds.hi.x || p.z < o->bounds.lo.z ||
+        p.z > o->bounds.hi.z || p.y > o->bounds.hi.y)
+      continue;
+    const std::vector<bool> opaque = opaque_triangles(scene_.mesh_of(*o));
+    bool odd = false;
+    for (std::size_t t = 0; t < opaque.size(); ++t)
+      if (opaque[t] && above(world_triangle(scene_, *o, t), p)) odd = !odd;
+    if (odd) return true;
+  }
+  return false;
+}
+
+/// Open objects without steep triangles, joined where they share a corner.
+std::vector<FreeSpace::Group> FreeSpace::tiles() const {
+  constexpr double kSteep = 1e-6;  // of the normal
+  struct PositionHash {
+    std::size_t operator()(const std::array<double, 3>& p) const {
+      std::uint64_t h = 0;
+      for (const double x : p)
+        h = mix(h ^ std::bit_cast<std::uint64_t>(x));
+      return h;
+    }
+  };
+  Group objects;
+  std::vector<std::uint32_t> parent;
+  const auto find = [&](std::uint32_t i) {
+    while (parent[i] != i)
+      i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  std::unordered_map<std::array<double, 3>, std::uint32_t, PositionHash> first_at;
+  for (const Object& o : scene_.objects) {
+    const std::size_t n = scene_.mesh_of(o).triangles();
+    if (o.always_visible || o.tag == OccluderTag::kNever || n == 0) continue;
+    bool level = true;
+    for (std::size_t t = 0; t < n && level; ++t) {
+      const Triangle w = world_triangle(scene_, o, t);
+      const Vec3 normal = glm::cross(w.b - w.a, w.c - w.a);
+      level = std::abs(normal.y) >= kSteep * glm::length(normal);
+    }
+    if (!level || !pieces_of(o.mesh)->any_open) continue;
+    const auto mine = static_cast<std::uint32_t>(objects.size());
+    objects.push_back(&o);
+    parent.push_back(mine);
+    for (std::size_t t = 0; t < n; ++t) {
+      const Triangle w = world_triangle(scene_, o, t);
+      for (const Vec3& p : {w.a, w.b, w.c}) {
+        const auto [it, fresh] = first_at.try_emplace({p.x + 0.0, p.y + 0.0, p.z + 0.0}, mine);
+        if (!fresh) parent[find(mine)] = find(it->second);
+      }
+    }
+  }
+  std::map<std::uint32_t, Group> groups;
+  for (std::uint32_t i = 0; i < objects.size(); ++i)
+    groups[find(i)].push_back(objects[i]);
+  std::vector<Group> several;
+  for (auto& [root, group] : groups)
+    if (group.size() > 1) several.push_back(std::move(group));
+  return several;
 }
 
 void FreeSpace::find_grounds() {
   constexpr std::size_t kProbes = 32;
   const Vec3 half = scene_.bounds.empty() ? Vec3{0} : scene_.bounds.size() * 0.5;
+  std::vector<Group> candidates = tiles();
   for (const Object& o : scene_.objects) {
     const Vec3 size = o.bounds.size();
     if (o.always_visible || scene_.mesh_of(o).triangles() == 0 || size.x < half.x ||
         size.z < half.z)
       continue;
-    if (!pieces_of(o.mesh)->any_open) continue;
+    if (pieces_of(o.mesh)->any_open) candidates.push_back({&o});
+  }
+  for (Group& group : candidates) {
+    Aabb box;
+    for (const Object* o : group)
+      box.add(o->bounds);
+    if (box.size().x < half.x || box.size().z < half.z) continue;
     std::size_t probes = 0;
     std::size_t under = 0;
     const std::size_t step = std::max<std::size_t>(1, scene_.objects.size() / kProbes);
     for (std::size_t i = 0; i < scene_.objects.size(); i += step) {
       const Object& other = scene_.objects[i];
-      if (&other == &o) continue;
+      if (std::find(group.begin(), group.end(), &other) != group.end()) continue;
       ++probes;
-      if (below(o, {other.bounds.centre().x, other.bounds.hi.y, other.bounds.centre().z})) ++under;
+      if (below(group, {other.bounds.centre().x, other.bounds.hi.y, other.bounds.centre().z}))
+        ++under;
     }
-    if (2 * under < std::max<std::size_t>(probes, 1)) grounds_.push_back(&o);
+    if (2 * under < std::max<std::size_t>(probes, 1)) grounds_.push_back(std::move(group));
   }
 }
 
@@ -183,7 +246,7 @@ bool FreeSpace::inside_solid(const Vec3& p) const {
 bool FreeSpace::is_free(const Vec3& p) const {
   if (inside_solid(p)) return false;
   return std::none_of(grounds_.begin(), grounds_.end(),
-                      [&](const Object* o) { return below(*o, p); });
+                      [&](const Group& g) { return below(g, p); });
 }
 
 std::vector<Vec3> FreeSpace::viewpoints(const ViewCell& cell, std::size_t n, std::uint64_t seed,

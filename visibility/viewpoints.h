@@ -14,10 +14,11 @@ namespace ivis {
 
 /// Decides which viewpoints count (docs/theory.md, section 1): none inside a solid or under the
 /// ground. Solids are the occluder set's, and every closed piece of opaque triangles of a node that
-/// is not marked `never` (one may stand in a tree's crown). Ground is an open mesh that spans half
-/// of the scene or more both ways and has most of the scene above it.
-/// Guarantee: in doubt a viewpoint does not count: a miss seen from one that does is real.
-/// Threads:   const and reentrant. Ownership: borrows all three; `occluders` may be null.
+/// is not marked `never` (one may stand in a tree's crown). Ground is an open mesh, or several
+/// without steep triangles that share corners to the last bit (tiles), that spans half of the scene
+/// or more both ways and has most of the scene above it. Guarantee: in doubt a viewpoint does not
+/// count: a miss seen from one that does is real. Threads:   const and reentrant. Ownership:
+/// borrows all three; `occluders` may be null.
 class FreeSpace {
  public:
   FreeSpace(const Scene& scene, const OccluderSet* occluders, const ExactSegments& segments);
@@ -46,14 +47,16 @@ class FreeSpace {
   bool inside_prism(const Vec3& p) const;
   bool inside_solid(const Vec3& p) const;
   bool inside_closed_piece(const Object& o, const Vec3& p) const;
-  bool below(const Object& ground, const Vec3& p) const;
+  using Group = std::vector<const Object*>;  ///< that are one ground together
+  bool below(const Group& ground, const Vec3& p) const;
+  std::vector<Group> tiles() const;
   void find_grounds();
 
   const Scene& scene_;
   const OccluderSet* occluders_;
   const ExactSegments& segments_;
   std::vector<Aabb> prism_bounds_;
-  std::vector<const Object*> grounds_;
+  std::vector<Group> grounds_;
   mutable std::mutex mutex_;
   /// By mesh, made when first asked for; guarded by mutex_.
   mutable std::map<std::uint32_t, std::shared_ptr<const Pieces>> pieces_;

@@ -111,6 +111,24 @@ TEST(ToolGenerate, ACityThatTheOtherCommandsTake) {
   EXPECT_EQ(ivis({"info", folder / "dressed.glb"}).code, 0);
 }
 
+TEST(ToolGenerate, TerrainThatIsShrunkAndVerifiedAsItStands) {
+  const Folder folder;
+  const std::string glb = folder / "hills.glb";
+  const std::string csv = folder / "flight.csv";
+  const std::string ivo = folder / "hills.ivo";
+  const Ran made = ivis({"generate", "terrain", "--made-up", "96", "--ragged", "--trees", "200",
+                         "--tile", "16", "--height", "20", "--poses", "100", "-o", glb, "--path-out",
+                         csv, "--json"});
+  ASSERT_EQ(made.code, 0) << made.errors;
+  EXPECT_GT(made.json()["objects"], 220);
+  EXPECT_EQ(made.json()["poses"], 100);
+  ASSERT_EQ(ivis({"shrink", glb, "--reach", "ball:3", "-o", ivo}).code, 0);
+  const Ran verified = ivis({"verify", glb, "--path", csv, "--reach", "ball:3", "--occluders", ivo,
+                             "--stride", "33", "--json"});
+  EXPECT_EQ(verified.code, 0) << verified.out;
+  EXPECT_LT(verified.json()["pvs_median"], made.json()["objects"]);
+}
+
 TEST(ToolDraw, WritesAPicture) {
   const SmallTown town;
   const std::string file = town.folder / "picture.svg";

@@ -73,6 +73,18 @@ TEST(ToolRefuses, UsageErrorsWithCodeTwo) {
   expect_refused({"generate", "city", "-o", t.folder / "f", "--poses", "1"}, 2, "--poses");
   expect_refused({"generate", "city", "-o", t.folder / "f", "--buildings", "18446744073709551615"},
                  2, "18446744073709551615");
+  const std::string out = t.folder / "f";
+  expect_refused({"generate", "terrain", "-o", out}, 2, "DEM or --made-up");
+  expect_refused({"generate", "terrain", "--made-up", "3", "-o", out}, 2, "--made-up");
+  expect_refused({"generate", "terrain", "--made-up", "16", "-o", out, "--tile", "0"}, 2, "--tile");
+  expect_refused({"generate", "terrain", "--made-up", "16", "-o", out, "--height", "nan"}, 2,
+                 "--height");
+  expect_refused({"generate", "terrain", "--made-up", "16", "-o", out, "--crop", "0,0,2,2"}, 2,
+                 "--crop");
+  for (const std::string bad : {"1,2,3", "1,2,3,4,5", "1,2,3,", "a,b,c,d", "-1,0,2,2"})
+    expect_refused({"generate", "terrain", "dem.asc", "-o", out, "--crop=" + bad}, 2, bad);
+  for (const std::string bad : {"1", "1,2,3", "nan,1", "-1,5", "1,"})
+    expect_refused({"generate", "terrain", "dem.asc", "-o", out, "--crop-m=" + bad}, 2, bad);
   expect_refused(
       {"draw", t.scene, "--eye", eye, "--reach", "disc:1", "-o", t.folder / "f.svg", "--radius", "nan"},
       2, "--radius");
@@ -94,6 +106,7 @@ TEST(ToolRefuses, InputErrorsWithCodeThree) {
     expect_refused({"verify", t.scene, "--path", bad, "--reach", "disc:1"}, 3, bad);
     expect_refused({"verify", t.scene, "--record", bad}, 3, bad);
     expect_refused({"walk", "--connect", "ipc://" + nothing, "--path", bad}, 3, bad);
+    expect_refused({"generate", "terrain", bad, "-o", t.folder / "f"}, 3, bad);
   }
   const std::string csv = t.folder / "bad.csv";
   for (const std::string text :

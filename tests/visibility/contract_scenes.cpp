@@ -70,6 +70,33 @@ Mesh slope(double fall) {
   return m;
 }
 
+double hills(double x, double z) {
+  return 14 * std::sin(x / 22) * std::cos(z / 27 + 0.4);
+}
+
+/// Part of a grid of 5 m cells over the hills, `i`, `k` from -30 to 30; cells in `hole` left out.
+template <class Hole>
+Mesh hills_tile(int i0, int k0, int i1, int k1, const Hole& hole) {
+  Mesh m;
+  for (int k = k0; k <= k1; ++k)
+    for (int i = i0; i <= i1; ++i)
+      m.positions.emplace_back(5 * i, hills(5 * i, 5 * k), 5 * k);
+  const int row = i1 - i0 + 1;
+  for (int k = k0; k < k1; ++k)
+    for (int i = i0; i < i1; ++i) {
+      if (hole(i, k)) continue;
+      const auto a = static_cast<std::uint32_t>((k - k0) * row + i - i0);
+      const auto c = a + static_cast<std::uint32_t>(row);
+      m.indices.insert(m.indices.end(), {a, c + 1, a + 1, a, c, c + 1});
+    }
+  m.primitives = {{0, static_cast<std::uint32_t>(m.triangles()), true, true}};
+  return m;
+}
+
+/// Buildings on hills. `ragged`: in four tiles, with a slanted border and a hole, through which one
+/// sees what lies under the ground.
+ContractScene hilly(bool ragged);
+
 ContractScene finished(std::string name, SceneBuilder builder, std::vector<Vec3> eyes,
                        const Vec3& in_solid) {
   ContractScene out{std::move(name), std::move(builder).finish(), std::move(eyes), in_solid, 0};
@@ -79,6 +106,37 @@ ContractScene finished(std::string name, SceneBuilder builder, std::vector<Vec3>
   out.scene.objects[out.mover].tag = OccluderTag::kNever;
   EXPECT_TRUE(finish_scene(out.scene));
   return out;
+}
+
+ContractScene hilly(bool ragged) {
+  SceneBuilder b;
+  const auto hole = [&](int i, int k) {
+    return ragged && (i + k > 44 || i - k > 48 || (i >= 6 && i < 9 && k >= -3 && k < 2));
+  };
+  if (ragged) {
+    for (const int i : {-30, 0})
+      for (const int k : {-30, 0})
+        b.add_mesh(hills_tile(i, k, i + 30, k + 30, hole));
+    b.add_box({48, -30, -6}, {52, -26, -2}, OccluderTag::kNever);
+    b.add_box({60, -40, -10}, {70, -30, 10}, OccluderTag::kNever);
+  } else {
+    b.add_mesh(hills_tile(-30, -30, 30, 30, hole));
+  }
+  for (const Vec2& p : {Vec2{-40, -30}, {-10, 40}, {60, 50}, {-80, 20}}) {
+    const double y = hills(p.x, p.y);
+    b.add_box({p.x, y - 8, p.y}, {p.x + 18, y + 12, p.y + 14});
+  }
+  for (int x = -145; x <= 145; x += 10)
+    for (int z = -145; z <= 145; z += 10) {
+      const double y = hills(x, z) + ((x + z) % 40 == 0 ? 9 : 0.3);
+      const Vec3 lo{x + 0.1 * (z % 7), y, z + 0.1 * (x % 5)};
+      b.add_box(lo, lo + Vec3{0.5}, OccluderTag::kNever);
+    }
+  const auto above = [](double x, double z, double y) { return Vec3{x, hills(x, z) + y, z}; };
+  return finished(
+      ragged ? "ragged hills in tiles" : "buildings on hills", std::move(b),
+      {above(0, 0, 1.7), above(33, 3, 1.2), above(-60, -70, 25), above(141, 100, 2), {180, 30, 20}},
+      {-31, hills(-40, -30) + 2, -23});
 }
 
 }  // namespace
@@ -149,6 +207,8 @@ std::vector<ContractScene> analytic_scenes() {
     all.push_back(
         finished("gabled houses", std::move(b), {street, {-27, 1.7, 0}, {0, 9, 0}}, {-20, 3, 14}));
   }
+  all.push_back(hilly(false));
+  all.push_back(hilly(true));
   return all;
 }
 

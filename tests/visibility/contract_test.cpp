@@ -112,7 +112,7 @@ void expect_contract(const ContractScene& s, const std::vector<Reach>& reaches) 
 }
 
 class MethodContract : public ::testing::TestWithParam<std::size_t> {};
-constexpr std::size_t kAnalyticScenes = 10;
+constexpr std::size_t kAnalyticScenes = 12;
 INSTANTIATE_TEST_SUITE_P(AnalyticScenes, MethodContract,
                          ::testing::Range<std::size_t>(0, kAnalyticScenes));
 
