@@ -18,6 +18,7 @@ struct Args {
   std::string builder = "fast";
   std::filesystem::path out;
   unsigned threads = 0;
+  double voxel_m = 0;
   bool json = false;
 };
 
@@ -31,6 +32,7 @@ Outcome run(const Args& args) {
   const auto space = args.space.read();
   if (!space) return space.error();
   options.view_space = *space;
+  options.voxel_m = args.voxel_m;
   const auto scene = args.scene.load(context);
   if (!scene) return scene.error();
   std::unique_ptr<Eroder> eroder;
@@ -42,7 +44,7 @@ Outcome run(const Args& args) {
   const auto shrunk = shrink(*scene, options, *eroder, context);
   if (!shrunk) return shrunk.error();
   if (auto s = write_occluders(args.out, shrunk->set); !s) return s.error();
-  if (shrunk->set.shrunk.empty()) std::cerr << "warning: no occluder is left for this reach: every PVS will list everything\n";
+  if (shrunk->set.shrunk.empty() && shrunk->set.solid_pieces.empty()) std::cerr << "warning: no occluder is left for this reach: every PVS will list everything\n";
   const ShrinkReport& r = shrunk->report;
   if (args.json) {
     Json left_out = Json::object();
@@ -54,6 +56,7 @@ Outcome run(const Args& args) {
   std::cout << r.occluders_in << " objects -> " << r.occluders_out << " shrunk prisms in " << r.seconds << " s ("
             << eroder->name() << " builder), " << 100 * r.volume_kept() << " % of the solids' volume kept\n";
   for (const auto& [reason, count] : r.left_out) std::cout << "  not taken: " << count << "  " << reason << '\n';
+  if (r.voxels) std::cout << to_text(*r.voxels);
   std::cout << "written: " << args.out.string() << '\n';
   return kOk;
 }
@@ -68,6 +71,7 @@ void add_shrink(CLI::App& app, std::function<Outcome()>& action) {
   sub->add_option("--reach", args->reach, "ball:r | disc:r | cylinder:r,h | ellipsoid:a,b,c | box:a,b,c, metres")->required()->type_name("R");
   sub->add_option("-o,--output", args->out, "occluder file to write")->required()->type_name("F.ivo");
   sub->add_option("--builder", args->builder, "fast: edge capsules; exact: CGAL Minkowski sums, slow")->capture_default_str()->check(CLI::IsMember({"fast", "exact"}));
+  sub->add_option("--voxels", args->voxel_m, "also take as solid whatever observers cannot get to, found with voxels of this side, metres; 0: do not")->type_name("SIZE_M")->capture_default_str()->check(number_within(0, 1e6));
   sub->add_option("--threads", args->threads, "0: as many as the machine has")->capture_default_str()->check(CLI::Range(0, 256));
   sub->add_flag("--json", args->json, "print JSON");
   sub->callback([&action, args] { action = [args] { return run(*args); }; });
