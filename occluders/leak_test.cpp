@@ -367,6 +367,81 @@ class Groups {
   std::vector<std::uint32_t> parent_;
 };
 
+/// The part of the segment a..b within the box grown by a hair; false if there is none.
+bool clip(const Vec3& lo, const Vec3& hi, Vec3& a, Vec3& b) {
+  const Vec3 d = b - a;
+  double from = 0;
+  double to = 1;
+  for (int k = 0; k < 3; ++k) {
+    if (d[k] == 0) {
+      if (a[k] < lo[k] || a[k] > hi[k]) return false;
+      continue;
+    }
+    const double p = (lo[k] - a[k]) / d[k];
+    const double q = (hi[k] - a[k]) / d[k];
+    from = std::max(from, std::min(p, q));
+    to = std::min(to, std::max(p, q));
+  }
+  if (!(from < to)) return false;
+  b = a + to * d;
+  a += from * d;
+  return true;
+}
+
+/// Looks through the openings that the edges of a tile's triangles may bound: rays that pass an
+/// edge closely, in both directions from there. Half run along the triangle (through a slit between
+/// two bodies), half anyhow (through a slit in a sheet). Distances from the edge are spread evenly
+/// by their logarithm, so that narrow slits are looked for as hard as wide ones. Calls join(label,
+/// label, voxel) for two ends in different components.
+template <class F>
+void look_past_edges(const VoxelGrid& grid, std::uint32_t m, std::size_t each, double tolerance,
+                     const F& join) {
+  const IVec3 t = grid.tile_at(grid.mixed[m].at);
+  const Vec3 lo = Vec3(t.x, t.y, t.z) * 8.0;
+  const double least = std::max(4 * tolerance, 1e-4);
+  for (std::uint32_t i = grid.mixed[m].first_triangle; i < grid.mixed[m + 1].first_triangle; ++i) {
+    const GridTriangle& tri = grid.triangles[grid.tile_triangles[i]];
+    const Vec3 cross = glm::cross(tri.v[1] - tri.v[0], tri.v[2] - tri.v[0]);
+    const double area = glm::length(cross);
+    if (!(area > 0)) continue;
+    const Vec3 normal = cross / area;
+    for (std::size_t e = 0; e < 3; ++e) {
+      Vec3 a = tri.v[e];
+      Vec3 b = tri.v[(e + 1) % 3];
+      const Vec3 along = (b - a) / std::max(1e-300, glm::length(b - a));
+      const Vec3 outward = glm::cross(along, normal);
+      if (!clip(lo, lo + 8.0, a, b)) continue;
+      Random random(mix((std::uint64_t{m} << 32U) + 4 * std::uint64_t{grid.tile_triangles[i]} + e));
+      for (std::size_t k = 0; k < each; ++k) {
+        const double off = least * std::pow(0.5 / least, random());
+        Vec3 q = a + random() * (b - a);
+        Vec3 d{0};
+        if (k % 2 == 0) {
+          q += (random() < 0.5 ? off : -off) * normal + (random() < 0.5 ? off : -off) * outward;
+          d = outward + (1.4 * random() - 0.7) * along;
+        } else {
+          q += off * outward + (2 * random() - 1) * off * normal;
+          d = 2.0 * Vec3(random(), random(), random()) - 1.0;
+        }
+        const double length = glm::length(d);
+        if (!(length > 1e-6) || glm::any(glm::lessThan(q, Vec3{0}))) continue;
+        d *= 64 / length;
+        std::uint32_t ends[2] = {0, 0};
+        IVec3 where;
+        for (std::size_t end = 0; end < 2; ++end) {
+          walk_ray(grid, q, end == 0 ? d : -d, tolerance, [&](std::uint32_t label, const IVec3& v) {
+            ends[end] = label;
+            where = v;
+            return false;
+          });
+          if (ends[end] == 0) break;
+        }
+        if (ends[0] != 0 && ends[1] != 0 && ends[0] != ends[1]) join(ends[0], ends[1], where);
+      }
+    }
+  }
+}
+
 struct Contact {
   std::uint32_t label, other;
   IVec3 where;
@@ -474,10 +549,15 @@ Result<LeakReport> test_leaks(const VoxelGrid& grid, const Barriers& barriers,
       constexpr std::size_t kBlock = 64;
       const std::size_t blocks = (borders.size() + kBlock - 1) / kBlock;
       std::vector<std::size_t> faces(blocks, 0);
+      std::vector<std::vector<std::uint32_t>> tiles(blocks);
       parallel_for(context, blocks, [&](std::size_t b) {
         for (std::size_t i = b * kBlock; i < std::min(borders.size(), (b + 1) * kBlock); ++i)
-          each_border(grid, borders[i].item,
-                      [&](const IVec3&, const Step&, std::uint32_t) { ++faces[b]; });
+          each_border(grid, borders[i].item, [&](const IVec3&, const Step&, std::uint32_t mixed) {
+            ++faces[b];
+            if (tiles[b].empty() || tiles[b].back() != mixed) tiles[b].push_back(mixed);
+          });
+        std::sort(tiles[b].begin(), tiles[b].end());
+        tiles[b].erase(std::unique(tiles[b].begin(), tiles[b].end()), tiles[b].end());
       });
       if (context.stopped()) return cancelled();
       const std::size_t all_faces = std::accumulate(faces.begin(), faces.end(), std::size_t{0});
@@ -523,6 +603,49 @@ Result<LeakReport> test_leaks(const VoxelGrid& grid, const Barriers& barriers,
       for (const auto& list : found)
         for (const Contact& c : list)
           contact(c.label, c.other, c.where, true);
+
+      // Rays past the edges in the tiles that the components border on.
+      std::vector<std::uint32_t> beside;
+      for (auto& list : tiles) {
+        beside.insert(beside.end(), list.begin(), list.end());
+        std::vector<std::uint32_t>().swap(list);
+      }
+      std::sort(beside.begin(), beside.end());
+      beside.erase(std::unique(beside.begin(), beside.end()), beside.end());
+      std::size_t edges = 0;
+      for (const std::uint32_t m : beside)
+        edges += 3 * (grid.mixed[m + 1].first_triangle - grid.mixed[m].first_triangle);
+      const std::size_t each_edge =
+          std::clamp<std::size_t>(options.max_rays / std::max<std::size_t>(1, edges), 4, 64);
+      report.rays += options.max_rays == 0 ? 0 : each_edge * edges;
+      std::vector<std::vector<Contact>> joined((beside.size() + kBlock - 1) / kBlock);
+      Progress edge_progress(context, "voxels: rays past edges", joined.size());
+      parallel_for(context, options.max_rays == 0 ? 0 : joined.size(), [&](std::size_t b) {
+        for (std::size_t i = b * kBlock; i < std::min(beside.size(), (b + 1) * kBlock); ++i) {
+          if (context.stopped()) return;
+          look_past_edges(grid, beside[i], each_edge, tolerance,
+                          [&](std::uint32_t p, std::uint32_t q, const IVec3& w) {
+                            const Contact c{std::max(p, q), std::min(p, q), w};
+                            const auto same = [&](const Contact& d) {
+                              return d.label == c.label && d.other == c.other;
+                            };
+                            if (std::none_of(joined[b].begin(), joined[b].end(), same))
+                              joined[b].push_back(c);
+                          });
+        }
+        edge_progress.step();
+      });
+      if (context.stopped()) return cancelled();
+      for (const auto& list : joined)
+        for (const Contact& c : list) {
+          if (queued[c.label] == 0 && queued[c.other] == 0) continue;  // neither matters
+          if (queued[c.label] == 0 && c.other == Flooded::kReached) {
+            groups.join(c.label, c.other);
+            continue;
+          }
+          contact(c.label, c.other, c.where, true);
+          if (c.other != Flooded::kReached) contact(c.other, c.label, c.where, true);
+        }
       todo = std::move(more);
       more.clear();
     }
