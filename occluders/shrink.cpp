@@ -217,6 +217,13 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
     add_prism_ladder(stacks, grown, eroder, {}, set, context);
     if (context.stopped()) return cancelled();
   }
+  if (options.voxel_m > 0) {
+    VoxelOptions voxel_options;
+    voxel_options.cell_m = options.voxel_m;
+    auto voxels = add_voxel_solids(scene, voxel_options, set, context);
+    if (!voxels) return voxels.error();
+    report.voxels = std::move(*voxels);
+  }
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
 }

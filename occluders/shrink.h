@@ -1,11 +1,13 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 
 #include "core/context.h"
 #include "core/result.h"
 #include "occluders/occluder_set.h"
+#include "occluders/voxel_solids.h"
 #include "scenes/scene.h"
 
 namespace ivis {
@@ -34,6 +36,7 @@ struct ShrinkReport {
   double solid_volume = 0;                      ///< cubic metres, real solids, without extensions
   double kept_volume = 0;                       ///< of the shrunk prisms, without extensions
   double seconds = 0;
+  std::optional<VoxelReport> voxels;  ///< when ShrinkOptions::voxel_m asked for them
   double volume_kept() const { return solid_volume > 0 ? kept_volume / solid_volume : 0; }
 };
 
@@ -48,6 +51,7 @@ struct ShrinkOptions {
   bool margins = true;
   std::vector<double> margins_m;  ///< empty: default_margins() of the reach
   SheetUse sheets = SheetUse::kAuto;
+  double voxel_m = 0;  ///< side of the voxels of general solids (voxel_solids.h); 0: none
 };
 
 struct Shrunk {

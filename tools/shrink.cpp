@@ -18,6 +18,7 @@ struct Args {
   std::string builder = "fast";
   std::filesystem::path out;
   unsigned threads = 0;
+  double voxel_m = 0;
   bool json = false;
 };
 
@@ -32,6 +33,7 @@ Outcome run(const Args& args) {
   const auto space = args.space.read();
   if (!space) return space.error();
   options.view_space = *space;
+  options.voxel_m = args.voxel_m;
   const auto scene = args.scene.load(context);
   if (!scene) return scene.error();
   std::unique_ptr<Eroder> eroder;
@@ -63,6 +65,7 @@ Outcome run(const Args& args) {
     std::cout << "  " << r.sheet_tiles << " sheets in " << r.sheet_planes << " planes, " << r.sheet_faces << " faces in all levels, in "
               << r.sheet_seconds << " s\n";
   for (const auto& [reason, count] : r.left_out) std::cout << "  not taken: " << count << "  " << reason << '\n';
+  if (r.voxels) std::cout << to_text(*r.voxels);
   std::cout << "written: " << args.out.string() << '\n';
   return kOk;
 }
@@ -77,6 +80,7 @@ void add_shrink(CLI::App& app, std::function<Outcome()>& action) {
   sub->add_option("--reach", args->reach, "ball:r | disc:r | cylinder:r,h | ellipsoid:a,b,c | box:a,b,c, metres")->required()->type_name("R");
   sub->add_option("-o,--output", args->out, "occluder file to write")->required()->type_name("F.ivo");
   sub->add_option("--builder", args->builder, "fast: edge capsules; exact: CGAL Minkowski sums, slow")->capture_default_str()->check(CLI::IsMember({"fast", "exact"}));
+  sub->add_option("--voxels", args->voxel_m, "also take as solid whatever observers cannot get to, found with voxels of this side, metres; 0: do not")->type_name("SIZE_M")->capture_default_str()->check(number_within(0, 1e6));
   sub->add_option("--threads", args->threads, "0: as many as the machine has")->capture_default_str()->check(CLI::Range(0, 256));
   sub->add_flag("--json", args->json, "print JSON");
   sub->callback([&action, args] { action = [args] { return run(*args); }; });
