@@ -5,7 +5,6 @@
 
 #include "core/view_cell.h"
 #include "occluders/convex.h"
-#include "occluders/prism_ladder.h"
 #include "occluders/progress.h"
 #include "occluders/sheets.h"
 
@@ -83,12 +82,9 @@ Status add_convex_and_sheets(const Scene& scene, const std::vector<const Object*
     }
   }
   std::vector<SolidPiece> shrunk(odd.size());
-  if (options.margins) {
-    set.margins_m = options.margins_m.empty() ? default_margins(options.reach.half_extents().x)
-                                              : options.margins_m;
+  if (options.margins)
     parallel_for(context, odd.size(),
                  [&](std::size_t k) { shrunk[k] = shrink_convex(odd[k], reach, set.margins_m); });
-  }
   for (SolidPiece& piece : shrunk)
     if (!piece.levels.empty()) set.solid_pieces.push_back(std::move(piece));
   report.convex_solids += odd.size();

@@ -134,6 +134,9 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
   set.view_space = options.view_space;
   set.slack_m = slack_for(scene.bounds);
   set.floor = lowest_y(scene);
+  if (options.margins)
+    set.margins_m = options.margins_m.empty() ? default_margins(options.reach.half_extents().x)
+                                              : options.margins_m;
 
   std::vector<const Object*> objects;
   for (const Object& o : scene.objects)
@@ -213,8 +216,8 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
   report.occluders_out = set.shrunk.size();
 
   if (options.margins) {
-    set.margins_m = options.margins_m.empty() ? default_margins(options.reach.half_extents().x) : options.margins_m;
-    add_prism_ladder(stacks, grown, eroder, {}, set, context);
+    const std::size_t failed = add_prism_ladder(stacks, grown, eroder, {}, set, context);
+    if (failed > 0) report.left_out["failed distance check"] += failed;
     if (context.stopped()) return cancelled();
   }
   if (options.voxel_m > 0) {
