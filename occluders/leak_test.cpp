@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "occluders/box_tree.h"
+#include "occluders/rect_tree.h"
 #include "occluders/progress.h"
 #include "occluders/triangle_box.h"
 #include "occluders/voxel_rays.h"
@@ -76,7 +76,7 @@ class ClosedSurfaces {
       owners_.push_back(i);
       boxes.push_back({{o.lo.x, o.lo.z}, {o.hi.x, o.hi.z}});
     }
-    tree_ = BoxTree(boxes);
+    tree_ = RectTree(boxes);
   }
 
   struct Id {
@@ -104,7 +104,7 @@ class ClosedSurfaces {
   const VoxelGrid& grid_;
   const Barriers& barriers_;
   std::vector<std::size_t> owners_;
-  BoxTree tree_;
+  RectTree tree_;
 };
 
 // ---- Fine flood

@@ -47,41 +47,50 @@ std::vector<PrismPiece> pieces_of(const FusedStack& stack, const Reach& padded_r
   const bool cut = std::max(size.x, size.z) > 1.5 * part_m;
   const auto columns = cut ? std::max(1.0, std::round(size.x / part_m)) : 1;
   const auto rows = cut ? std::max(1.0, std::round(size.z / part_m)) : 1;
-  const Vec2 step{size.x / columns, size.z / rows};
+  const Vec2 part{size.x / columns, size.z / rows};
+  const double vertical = padded_reach.half_extents().y;
   std::map<std::pair<int, int>, PrismPiece> pieces;
   const bool reaches_down = stack.grounded || stack.bottom <= set.floor;
-  for (std::size_t k = 0; k < set.margins_m.size(); ++k) {
-    const Reach reach = padded_reach.grown(set.margins_m[k], set.margins_m[k]);
-    const double vertical = reach.half_extents().y;
-    for (const FusedLevel& level : stack.levels) {
-      const double top = level.top - vertical;
-      const double raised = stack.bottom + vertical;
-      if (!reaches_down && raised >= top) continue;
-      for (const Polygon& region : level.region)
-        for (const Polygon& eroded : gated_erosion(region, reach, eroder, kMinAreaM2, failed)) {
-          const auto add = [&](int column, int row, Polygon part) {
-            auto& levels = pieces[{row, column}].levels;
-            if (levels.size() <= k) levels.resize(k + 1);
-            levels[k].push_back(
-                {std::move(part), std::min(raised, top), top, stack.bottom, stack.grounded});
-          };
-          if (!cut) {
-            add(0, 0, eroded);
-            continue;
-          }
-          const Aabb b = bounds_of({eroded});
-          const auto cell = [](double v, double lo, double s, double n) {
-            return static_cast<int>(std::clamp(std::floor((v - lo) / s), 0.0, n - 1));
-          };
-          for (int r = cell(b.lo.z, whole.lo.z, step.y, rows);
-               r <= cell(b.hi.z, whole.lo.z, step.y, rows); ++r)
-            for (int c = cell(b.lo.x, whole.lo.x, step.x, columns);
-                 c <= cell(b.hi.x, whole.lo.x, step.x, columns); ++c) {
-              const Vec2 lo{whole.lo.x + c * step.x, whole.lo.z + r * step.y};
-              for (Polygon& part : within(eroded, lo, lo + step))
-                if (area(part) >= kMinAreaM2) add(c, r, std::move(part));
-            }
+  const auto add = [&](std::size_t k, int column, int row, Prism prism) {
+    auto& levels = pieces[{row, column}].levels;
+    if (levels.size() <= k) levels.resize(k + 1);
+    levels[k].push_back(std::move(prism));
+  };
+  const auto cell = [](double v, double lo, double s, double n) {
+    return static_cast<int>(std::clamp(std::floor((v - lo) / s), 0.0, n - 1));
+  };
+  for (const FusedLevel& level : stack.levels) {
+    std::vector<Polygon> left = level.region;
+    for (std::size_t k = 0; k < set.margins_m.size() && !left.empty(); ++k) {
+      const double margin = set.margins_m[k];
+      const double top = level.top - vertical - margin;
+      const double raised = stack.bottom + vertical + margin;
+      if (!reaches_down && raised >= top) break;
+      // E(E(region, V'), B(m)) = E(region, V' + B(m)): each margin goes on from the one before, whose outline is simpler.
+      const Reach step = k == 0 ? padded_reach.grown(margin, margin) : Reach::disc(margin - set.margins_m[k - 1]);
+      std::vector<Polygon> eroded;
+      for (const Polygon& polygon : left)
+        for (Polygon& piece : gated_erosion(polygon, step, eroder, kMinAreaM2, failed)) eroded.push_back(std::move(piece));
+      for (const Polygon& polygon : eroded) {
+        const Prism whole_prism{{}, std::min(raised, top), top, stack.bottom, stack.grounded};
+        const auto part_of = [&](Polygon footprint) {
+          Prism prism = whole_prism;
+          prism.footprint = std::move(footprint);
+          return prism;
+        };
+        if (!cut) {
+          add(k, 0, 0, part_of(polygon));
+          continue;
         }
+        const Aabb b = bounds_of({polygon});
+        for (int r = cell(b.lo.z, whole.lo.z, part.y, rows); r <= cell(b.hi.z, whole.lo.z, part.y, rows); ++r)
+          for (int c = cell(b.lo.x, whole.lo.x, part.x, columns); c <= cell(b.hi.x, whole.lo.x, part.x, columns); ++c) {
+            const Vec2 lo{whole.lo.x + c * part.x, whole.lo.z + r * part.y};
+            for (Polygon& within_cell : within(polygon, lo, lo + part))
+              if (area(within_cell) >= kMinAreaM2) add(k, c, r, part_of(std::move(within_cell)));
+          }
+      }
+      left = std::move(eroded);
     }
   }
   std::vector<PrismPiece> out;

@@ -38,6 +38,7 @@ struct Way {
   MethodTraits traits;
   MethodOptions options;
   std::string name() const {
+    if (traits.name != "cull-map") return traits.name;
     return traits.name + (options.map == CullMapKind::kPolar ? ", polar" : ", orthographic");
   }
 };
@@ -50,7 +51,7 @@ std::vector<Way> ways() {
       options.map = map;
       options.rays = 32;
       all.push_back({traits, options});
-      if (traits.name == "reference") break;
+      if (traits.name != "cull-map") break;
     }
   return all;
 }
