@@ -341,6 +341,7 @@ class SheetBuilder {
 
   struct Tile {
     std::vector<std::vector<Quad>> levels;
+    bool whole = false;  ///< the largest radius leaves all of it
   };
 
   void divide(const Box2& box, const Levels& around, const std::vector<Polygon>& shown_around,
@@ -366,6 +367,7 @@ class SheetBuilder {
       return;
     }
     Tile tile;
+    tile.whole = whole;
     for (const auto& level : levels) {
       std::vector<Quad> quads;
       for (const Polygon& p : level) {
@@ -416,7 +418,20 @@ class SheetBuilder {
       }
       while (!sheet.levels.empty() && sheet.levels.back().empty())
         sheet.levels.pop_back();
-      if (!sheet.levels.empty()) out.sheets.push_back(std::move(sheet));
+      if (sheet.levels.empty()) continue;
+      out.sheets.push_back(sheet);
+      // From behind: what passes the edges of the solid's other faces still meets this one. Where
+      // no edge is near, the faces on that side hide as much.
+      if (t.whole) continue;
+      sheet.normal = -sheet.normal;
+      sheet.offset = -sheet.offset;
+      for (FaceMesh& mesh : sheet.levels) {
+        for (auto& f : mesh.faces)
+          f = f[2] == f[3] ? std::array{f[2], f[1], f[0], f[0]}
+                           : std::array{f[3], f[2], f[1], f[0]};
+        out.report.faces += mesh.faces.size();
+      }
+      out.sheets.push_back(std::move(sheet));
     }
   }
 
@@ -430,7 +445,7 @@ class SheetBuilder {
 
 std::vector<double> sheet_radii(double r_v_m) {
   std::vector<double> radii;
-  for (double r = 1.05; r < 20; r *= 1.3)
+  for (double r = 1.05; r < 20; r *= 1.4)
     radii.push_back(r * r_v_m);
   return radii;
 }

@@ -49,7 +49,7 @@ struct ShrinkOptions {
   ViewSpace view_space;
   /// Also make what the occlusion map draws.
   bool margins = true;
-  std::vector<double> margins_m;  ///< empty: default_margins() of the reach
+  std::vector<double> margins_m{};  ///< empty: default_margins() of the reach
   SheetUse sheets = SheetUse::kAuto;
   double voxel_m = 0;  ///< side of the voxels of general solids (voxel_solids.h); 0: none
 };

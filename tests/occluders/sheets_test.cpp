@@ -210,7 +210,7 @@ TEST(Sheets, BrushesSideBySideAreOneWall) {
   b.add_box({0, 0, 0}, {5, 6, 0.3}, OccluderTag::kOnly);
   b.add_box({5, 0, 0}, {10, 6, 0.3}, OccluderTag::kOnly);
   const Made m = make(std::move(b));
-  const std::size_t last = 8;  // 1.3 m
+  const std::size_t last = 6;  // 1.2 m
   EXPECT_TRUE(covers(m, last, {0, 0, 1}, {5, 3, 0.3}));
   EXPECT_TRUE(covers(m, last, {0, 0, -1}, {5, 3, 0}));
   EXPECT_FALSE(covers(m, 0, {0, 0, 1}, {0.1, 3, 0.3}));  // nearer to the end than the reach
@@ -270,6 +270,18 @@ TEST(Sheets, WallsGoOnIntoWhatTheyMeet) {
   b.add_box({-5, -1, -4}, {5.3, 0, 4}, OccluderTag::kOnly);  // the floor
   const Made m = make(std::move(b));
   EXPECT_TRUE(covers(m, 0, {0, 0, 1}, {4.999, 0.001, 0.3}));
+}
+
+TEST(Sheets, AreListedFromBehindWhereAnEdgeIsNear) {
+  SceneBuilder b;
+  add_wall_with_window(b, {0, 0, 0});
+  b.add_box({-50, -50, 20}, {50, 50, 20.3}, OccluderTag::kOnly);
+  const Made m = make(std::move(b));
+  // The wall's face towards +z, and its other face seen from +z through the wall.
+  EXPECT_TRUE(covers(m, 0, {0, 0, 1}, {2, 2, 0.3}));
+  EXPECT_TRUE(covers(m, 0, {0, 0, 1}, {2, 2, 0}));
+  EXPECT_TRUE(covers(m, 0, {0, 0, 1}, {20, 20, 20.3}));
+  EXPECT_FALSE(covers(m, 0, {0, 0, 1}, {20, 20, 20}));  // nothing but wall for 16 r_V around
 }
 
 TEST(Sheets, FacesThatNobodySeesGiveNone) {
