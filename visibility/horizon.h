@@ -19,7 +19,7 @@ namespace ivis {
 /// Threads: one writer; readers after it.
 class Horizon {
  public:
-  static constexpr std::uint32_t kMostUnitsAFace = 256;
+  static constexpr std::uint32_t kMostUnitsAFace = 128;
   static constexpr int kMantissaBits = 5;    ///< of a row's distance: 32 rows an octave
   static constexpr std::uint32_t kPad = 80;  ///< units repeated behind the last
   static constexpr int kShift = 23 - kMantissaBits;
