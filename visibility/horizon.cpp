@@ -105,7 +105,8 @@ bool TerrainMap::known_about(const Vec2& eye, double half_m) const {
 // lowers h. A cell that is not known ends the unit's run for good: behind it a sight line may have
 // passed under the surface through a hole.
 bool TerrainMap::draw_strip(const Face& face, double near, double far, double height,
-                            std::size_t units, Horizon& horizon, double* running) const {
+                            std::size_t units, Horizon& horizon, float* row,
+                            std::uint8_t* done) const {
   // Squares about half a strip deep.
   std::size_t level = 0;
   const auto depth = [&](const Level& l) { return face.along_x ? l.step.x : l.step.y; };
@@ -133,13 +134,13 @@ bool TerrainMap::draw_strip(const Face& face, double near, double far, double he
   line.assign(lines, std::numeric_limits<float>::infinity());
   const float* cells = (face.along_x ? turned_ : least_).data() + l.first;
   for (auto m = static_cast<std::size_t>(from); m <= static_cast<std::size_t>(to); ++m) {
-    const float* row =
+    const float* from_line =
         cells + m * static_cast<std::size_t>(n_minor) + static_cast<std::size_t>(first_line);
     for (std::size_t i = 0; i < lines; ++i)
-      line[i] = std::min(line[i], row[i]);
+      line[i] = std::min(line[i], from_line[i]);
   }
-  // running[2 g] is the slope so far, running[2 g + 1] is 0 while the run goes on.
   bool any = false;
+  const std::size_t share = units_a_face_ / units;
   const double width = 2.0 / static_cast<double>(units);
   const double by_near = (1 - kRelative) / near;
   const double by_far = (1 + kRelative) / far;
@@ -148,7 +149,7 @@ bool TerrainMap::draw_strip(const Face& face, double near, double far, double he
   const double near_lines = near / step_minor;
   const double far_lines = far / step_minor;
   for (std::size_t g = 0; g < units; ++g) {
-    if (running[2 * g + 1] != 0) continue;
+    if (done[g] != 0) continue;
     const double u0 = -1 + width * static_cast<double>(g) - kSideSlack;
     const double u1 = u0 + width + 2 * kSideSlack;
     const double s0 = u0 < 0 ? u0 * far_lines : u0 * near_lines;
@@ -162,12 +163,14 @@ bool TerrainMap::draw_strip(const Face& face, double near, double far, double he
         least = std::min(least, line[static_cast<std::size_t>(i)]);
     }
     if (static_cast<double>(least) < kKnown) {
-      running[2 * g + 1] = 1;
+      done[g] = 1;
       continue;
     }
     any = true;
     const double h = static_cast<double>(least) - height;
-    running[2 * g] = std::max(running[2 * g], h * (h >= 0 ? by_near : by_far));
+    // To the nearest float: kRelative is more than that.
+    const auto slope = static_cast<float>(h * (h >= 0 ? by_near : by_far));
+    if (slope > row[g * share]) std::fill_n(row + g * share, share, slope);
   }
   return any;
 }
@@ -182,11 +185,8 @@ void TerrainMap::draw(const float eye[3], Horizon& horizon) const {
   if (rows_ < 2 || !known_about(foot, start * (1 + 2 * kSideSlack))) return;
   horizon.slopes_.resize(static_cast<std::size_t>(rows_) * horizon.stride_);
   const std::size_t units = units_a_face_;
-  const double unset = std::numeric_limits<double>::lowest();
-  auto& running = horizon.running_;
-  running.assign(4 * 2 * units, 0);
-  for (std::size_t i = 0; i < running.size(); i += 2)
-    running[i] = unset;
+  auto& done = horizon.done_;
+  done.assign(4 * units, 0);
   const Face faces[4] = {
       {true, 1, 1, foot}, {false, 1, -1, foot}, {true, -1, -1, foot}, {false, -1, 1, foot}};
   const double finest = std::max(levels_[0].step.x, levels_[0].step.y);
@@ -199,30 +199,21 @@ void TerrainMap::draw(const float eye[3], Horizon& horizon) const {
     const auto far = static_cast<double>(Horizon::distance(r + 1, base_));
     // Units about as wide as a cell: narrower ones would see the same cells. Halves inherit.
     while (now < units && 2 * far / static_cast<double>(now) > finest) {
-      for (std::size_t f = 0; f < 4; ++f) {
-        double* run = running.data() + f * 2 * units;
+      for (std::size_t f = 0; f < 4; ++f)
         for (std::size_t g = now; g-- > 0;)
-          for (std::size_t half = 2; half-- > 0;) {
-            run[2 * (2 * g + half)] = run[2 * g];
-            run[2 * (2 * g + half) + 1] = run[2 * g + 1];
-          }
-      }
+          done[f * units + 2 * g] = done[f * units + 2 * g + 1] = done[f * units + g];
       now *= 2;
     }
-    ++r;
     float* row = horizon.slopes_.data() + static_cast<std::size_t>(r) * horizon.stride_;
+    std::copy_n(row, 4 * units, row + horizon.stride_);
+    row += horizon.stride_;
+    ++r;
     bool any = false;
     for (std::size_t f = 0; f < 4; ++f) {
-      double* run = running.data() + f * 2 * units;
       // Where it leaves the field, what was seen so far stays.
-      alive[f] = alive[f] &&
-                 draw_strip(faces[f], near, far, static_cast<double>(eye[1]), now, horizon, run);
+      alive[f] = alive[f] && draw_strip(faces[f], near, far, static_cast<double>(eye[1]), now,
+                                        horizon, row + f * units, done.data() + f * units);
       any = any || alive[f];
-      for (std::size_t g = 0; g < now; ++g) {
-        const double s = run[2 * g];
-        std::fill_n(row + f * units + g * (units / now), units / now,
-                    s == unset ? kNothing : below(s));
-      }
     }
     std::copy_n(row, Horizon::kPad, row + 4 * units);
     if (!any) break;

@@ -19,7 +19,7 @@ namespace ivis {
 /// Threads: one writer; readers after it.
 class Horizon {
  public:
-  static constexpr std::uint32_t kMostUnitsAFace = 256;
+  static constexpr std::uint32_t kMostUnitsAFace = 128;
   static constexpr int kMantissaBits = 5;    ///< of a row's distance: 32 rows an octave
   static constexpr std::uint32_t kPad = 80;  ///< units repeated behind the last
   static constexpr int kShift = 23 - kMantissaBits;
@@ -53,7 +53,7 @@ class Horizon {
   int unit_shift_ = 0;
   // Of the face being drawn.
   std::vector<float> line_;
-  std::vector<double> running_;
+  std::vector<std::uint8_t> done_;  ///< of each unit: its run has ended
 };
 
 /// The shrunk height field with its minima over squares of 2, 4, ... cells, relative to an origin.
@@ -74,8 +74,9 @@ class TerrainMap {
   };
   struct Face;
   bool known_about(const Vec2& eye, double half_m) const;
+  /// Raises the slopes of one face's units by one strip; false when no run goes on.
   bool draw_strip(const Face& face, double near, double far, double height, std::size_t units,
-                  Horizon& horizon, double* running) const;
+                  Horizon& horizon, float* row, std::uint8_t* done) const;
 
   Vec2 lo_{0};
   std::vector<Level> levels_;

@@ -116,9 +116,9 @@ TEST(ToolGenerate, TerrainThatIsShrunkAndVerifiedAsItStands) {
   const std::string glb = folder / "hills.glb";
   const std::string csv = folder / "flight.csv";
   const std::string ivo = folder / "hills.ivo";
-  const Ran made = ivis({"generate", "terrain", "--made-up", "96", "--ragged", "--trees", "200",
-                         "--tile", "16", "--height", "20", "--poses", "100", "-o", glb, "--path-out",
-                         csv, "--json"});
+  const Ran made =
+      ivis({"generate", "terrain", "--made-up", "96", "--ragged", "--trees", "200", "--tile", "16",
+            "--height", "20", "--poses", "100", "-o", glb, "--path-out", csv, "--json"});
   ASSERT_EQ(made.code, 0) << made.errors;
   EXPECT_GT(made.json()["objects"], 220);
   EXPECT_EQ(made.json()["poses"], 100);

@@ -85,9 +85,9 @@ TEST(ToolRefuses, UsageErrorsWithCodeTwo) {
     expect_refused({"generate", "terrain", "dem.asc", "-o", out, "--crop=" + bad}, 2, bad);
   for (const std::string bad : {"1", "1,2,3", "nan,1", "-1,5", "1,"})
     expect_refused({"generate", "terrain", "dem.asc", "-o", out, "--crop-m=" + bad}, 2, bad);
-  expect_refused(
-      {"draw", t.scene, "--eye", eye, "--reach", "disc:1", "-o", t.folder / "f.svg", "--radius", "nan"},
-      2, "--radius");
+  expect_refused({"draw", t.scene, "--eye", eye, "--reach", "disc:1", "-o", t.folder / "f.svg",
+                  "--radius", "nan"},
+                 2, "--radius");
   expect_refused({"walk", "--connect", "ipc://x", "--path", t.path, "--policy", "wait"}, 2, "wait");
   expect_refused({"walk", "--connect", "carrier-pigeon", "--path", t.path}, 2, "carrier-pigeon");
 }
