@@ -68,7 +68,7 @@ Status add_convex_and_sheets(const Scene& scene, const std::vector<const Object*
       prisms[i].left_out.erase("too thin or too sloped for a prism");
     }
     for (ConvexPiece& piece : found[i].pieces) {
-      if (!piece.upright_prism) {
+      if (!piece.upright_prism || prisms[i].prisms.empty()) {
         for (std::size_t s = 0; s < options.view_space.seeds.size(); ++s)
           if (contains(piece.solid, options.view_space.seeds[s])) {
             const std::string& name = scene.name_of(*objects[i]);

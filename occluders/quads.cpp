@@ -15,7 +15,7 @@ struct IntPoint {
   bool operator==(const IntPoint&) const = default;
 };
 using IntRing = std::vector<IntPoint>;
-constexpr std::int64_t kMaxExtent = std::int64_t{1} << 28;  // products of differences stay exact
+constexpr std::int64_t kMaxExtent = std::int64_t{1} << 29;  // products of differences stay exact
 
 std::int64_t cross(const IntPoint& o, const IntPoint& a, const IntPoint& b) {
   return (a.x - o.x) * (b.y - o.y) - (a.y - o.y) * (b.x - o.x);

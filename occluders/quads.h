@@ -12,7 +12,7 @@ namespace ivis {
 using Quad = std::array<Vec2, 4>;
 
 /// Parts the polygon into triangles between its own corners, and joins pairs of them that make a
-/// convex quadrangle. Corners are taken on the grid of clip.h; extent at most 256 m.
+/// convex quadrangle. Corners are taken on the grid of clip.h; extent at most 512 m.
 /// Guarantee: none of its own: where rings touch or cross, parts may be missing, or lie outside.
 /// For
 ///            proper polygons the faces part it exactly. What matters is checked afterwards.

@@ -6,12 +6,12 @@
 #include <limits>
 #include <numeric>
 
-#include "occluders/rect_tree.h"
 #include "occluders/clip.h"
 #include "occluders/distance_check.h"
 #include "occluders/fast_erosion.h"
 #include "occluders/progress.h"
 #include "occluders/quads.h"
+#include "occluders/rect_tree.h"
 #include "occluders/simplify.h"
 
 namespace ivis {
@@ -19,6 +19,7 @@ namespace {
 
 constexpr double kInsideM = 0.001;   ///< how far below its faces a sheet cuts the solids
 constexpr double kMostSeamM = 1e-4;  ///< seams are closed by this at most, from either side
+constexpr double kMaxTiles = 4096;   ///< of one part of a plane, before they are divided
 constexpr double kMinExposedM2 = 0.01;
 constexpr int kTangents = 16;  ///< of a shrunk sheet's round corners, a whole turn
 
@@ -69,12 +70,15 @@ Ring section(const ConvexSolid& solid, const PlaneFrame& frame, const Box2& box,
   };
   std::vector<HalfPlane> halves;
   halves.reserve(solid.planes.size());
+  const double span = glm::length(glm::max(glm::abs(box.lo), glm::abs(box.hi)));
   for (const ConvexSolid::Plane& p : solid.planes) {
     const Vec2 across{glm::dot(p.normal, frame.u), glm::dot(p.normal, frame.v)};
     const double offset = p.offset - glm::dot(p.normal, frame.origin);
     const double length = glm::length(across);
-    if (length < 1e-9) {
-      if (offset < 0) return {};
+    // All but parallel: dividing would lose the digits. It cuts nothing off within the box, or the
+    // section is given up.
+    if (length < 1e-7) {
+      if (offset < length * span) return {};
       continue;
     }
     halves.push_back({across / length, offset / length});
@@ -197,12 +201,15 @@ class SheetBuilder {
  public:
   SheetBuilder(const std::vector<ConvexPiece>& solids, const SheetOptions& options)
       : solids_(solids), options_(options), eroder_(kTangents) {
+    std::vector<Box2> boxes;
     for (const ConvexPiece& s : solids) {
       const Vec3 far = glm::max(glm::abs(s.solid.bounds.lo), glm::abs(s.solid.bounds.hi));
       const auto f = static_cast<float>(std::max({far.x, far.y, far.z}));
       const float step = std::nextafter(f, std::numeric_limits<float>::infinity()) - f;
+      boxes.push_back({ground(s.solid.bounds.lo), ground(s.solid.bounds.hi)});
       seams_.push_back(s.only ? std::min(kMostSeamM, 4 * static_cast<double>(step)) : 0);
     }
+    tree_ = BoxTree(boxes);
   }
 
   Built build(const PlaneGroup& group) const {
@@ -234,25 +241,28 @@ class SheetBuilder {
       faces.push_back(std::move(ring));
     }
     const double around = options_.radii_m.back() + 0.01;
-    const std::vector<Cut> cuts = cuts_at(frame);
-    const std::vector<Cut> cuts_before = cuts_at(before);
     for (const auto& members : clusters(boxes)) {
       Box2 roi;
+      Aabb place;
       std::vector<Ring> shown;
       for (const std::size_t m : members) {
         roi.add(boxes[m]);
+        for (const Vec3& p : group.faces[m].ring)
+          place.add(p);
         shown.push_back(faces[m]);
       }
+      place.lo -= Vec3{around};
+      place.hi += Vec3{around};
       // Faces that other solids stand against cannot be in view.
       std::vector<Ring> hidden;
       double no_seam = 0;
-      collect(cuts_before, before, roi, hidden, no_seam);
+      collect(cuts_at(before, place), before, roi, hidden, no_seam);
       std::vector<Polygon> exposed = subtract(shown, Fill::kNonZero, hidden);
       std::erase_if(exposed, [](const Polygon& p) { return area(p) < kMinExposedM2; });
       if (exposed.empty()) continue;
       std::vector<Ring> matter;
       double seam = 0;
-      collect(cuts, frame, grown(roi, around), matter, seam);
+      collect(cuts_at(frame, place), frame, grown(roi, around), matter, seam);
       shrink_part(frame, unite(matter, Fill::kNonZero), seam, exposed, out);
     }
     out.report.planes = out.sheets.empty() ? 0 : 1;
@@ -268,11 +278,18 @@ class SheetBuilder {
   /// One tile to be, with what of each level lies in it.
   using Levels = std::vector<std::vector<Polygon>>;
 
-  /// Solids that the plane may meet.
-  std::vector<Cut> cuts_at(const PlaneFrame& frame) const {
+  /// Solids that the plane may meet near `place`.
+  std::vector<Cut> cuts_at(const PlaneFrame& frame, const Aabb& place) const {
+    std::vector<std::uint32_t> near;
+    tree_.all({ground(place.lo), ground(place.hi)}, [&](std::uint32_t s) {
+      near.push_back(s);
+      return true;
+    });
+    std::sort(near.begin(), near.end());
     std::vector<Cut> cuts;
-    for (std::size_t s = 0; s < solids_.size(); ++s) {
+    for (const std::uint32_t s : near) {
       const Aabb& b = solids_[s].solid.bounds;
+      if (!b.overlaps(place)) continue;
       const Vec3 half = b.size() * 0.5;
       const Vec3 c = b.centre() - frame.origin;
       if (std::abs(glm::dot(frame.n, c)) > glm::dot(glm::abs(frame.n), half)) continue;
@@ -320,7 +337,10 @@ class SheetBuilder {
       }
       if (levels.empty()) continue;
       std::vector<Tile> tiles;
-      const double size = options_.tile_m;
+      // A huge plane gets larger tiles rather than more.
+      double size = options_.tile_m;
+      while ((roi.size().x / size + 1) * (roi.size().y / size + 1) > kMaxTiles)
+        size *= 2;
       const auto index = [&](double x) { return static_cast<std::int64_t>(std::floor(x / size)); };
       for (std::int64_t j = index(roi.lo.y); j <= index(roi.hi.y); ++j) {
         const double y = static_cast<double>(j) * size;
@@ -332,7 +352,8 @@ class SheetBuilder {
           in_row.push_back(inside(level, row));
         for (std::int64_t i = index(roi.lo.x); i <= index(roi.hi.x); ++i) {
           const double x = static_cast<double>(i) * size;
-          divide({{x, y}, {x + size, y + size}}, in_row, shown, tiles);
+          divide({{x, y}, {x + size, y + size}}, in_row, shown,
+                 options_.least_tile_m * size / options_.tile_m, tiles);
         }
       }
       finish(frame, piece, seam, tiles, out);
@@ -345,7 +366,7 @@ class SheetBuilder {
   };
 
   void divide(const Box2& box, const Levels& around, const std::vector<Polygon>& shown_around,
-              std::vector<Tile>& tiles) const {
+              double least, std::vector<Tile>& tiles) const {
     const std::vector<Polygon> shown = inside(shown_around, box);
     if (area(shown) < kMinExposedM2) return;
     Levels levels;
@@ -358,12 +379,12 @@ class SheetBuilder {
     const Vec2 size = box.size();
     const bool whole = levels.size() == options_.radii_m.size() &&
                        area(levels.back()) > size.x * size.y * (1 - 1e-6);
-    if (!whole && size.x > options_.least_tile_m * 1.5) {
+    if (!whole && size.x > least * 1.5) {
       const Vec2 middle = (box.lo + box.hi) * 0.5;
       for (const Box2& part :
            {Box2{box.lo, middle}, Box2{{middle.x, box.lo.y}, {box.hi.x, middle.y}},
             Box2{{box.lo.x, middle.y}, {middle.x, box.hi.y}}, Box2{middle, box.hi}})
-        divide(part, levels, shown, tiles);
+        divide(part, levels, shown, least, tiles);
       return;
     }
     Tile tile;
@@ -439,6 +460,7 @@ class SheetBuilder {
   const SheetOptions& options_;
   FastEroder eroder_;
   std::vector<double> seams_;
+  BoxTree tree_;
 };
 
 }  // namespace
