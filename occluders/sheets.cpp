@@ -209,7 +209,7 @@ class SheetBuilder {
       boxes.push_back({ground(s.solid.bounds.lo), ground(s.solid.bounds.hi)});
       seams_.push_back(s.only ? std::min(kMostSeamM, 4 * static_cast<double>(step)) : 0);
     }
-    tree_ = BoxTree(boxes);
+    tree_ = RectTree(boxes);
   }
 
   Built build(const PlaneGroup& group) const {
@@ -460,7 +460,7 @@ class SheetBuilder {
   const SheetOptions& options_;
   FastEroder eroder_;
   std::vector<double> seams_;
-  BoxTree tree_;
+  RectTree tree_;
 };
 
 }  // namespace
