@@ -94,7 +94,7 @@ std::vector<PrismPiece> pieces_of(const FusedStack& stack, const Reach& padded_r
     }
   }
   std::vector<PrismPiece> out;
-  for (auto& [cell, piece] : pieces)
+  for (auto& [place, piece] : pieces)
     out.push_back(std::move(piece));
   return out;
 }
