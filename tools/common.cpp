@@ -146,6 +146,10 @@ void SolveArgs::add_to(CLI::App& app, bool reach_required) {
   app.add_option("--occluders", occluders, "shrunk occluders, made by 'ivis shrink' (default: shrink now)")->type_name("F.ivo");
   app.add_option("--threads", threads, "threads of one solve; the result does not depend on it")->capture_default_str()->check(CLI::Range(1, 256));
   app.add_option("--max-occluders", max_occluders, "draw only the N occluders of largest projected area; 0: all that show")->capture_default_str()->check(CLI::NonNegativeNumber);
+  app.add_option("--map-pixels", map_pixels, "pixels a side of the occlusion map's six faces, a multiple of 16 from 64 to 4096: more hide more and cost more")
+      ->capture_default_str()
+      ->check(number_within(64, 4096))
+      ->check(CLI::Validator([](const std::string& text) { return std::stoul(text) % 16 == 0 ? "" : "'" + text + "' is not a multiple of 16"; }, "MULTIPLE OF 16"));
   app.add_option("--reference-rays", rays, "aimed rays an object of the method 'reference'")->capture_default_str()->check(CLI::Range(1, 1000000));
 }
 
@@ -212,6 +216,7 @@ Result<std::unique_ptr<Method>> SolveArgs::make(const Scene& scene, const Occlud
   options.map = map == "polar" ? CullMapKind::kPolar : CullMapKind::kOrthographic;
   options.threads = threads;
   options.max_occluders = max_occluders;
+  options.map_pixels = map_pixels;
   options.rays = rays;
   return make_method(method, scene, set, options);
 }

@@ -74,6 +74,7 @@ struct SolveArgs {
   std::filesystem::path occluders;
   unsigned threads = 1;
   std::size_t max_occluders = 0;
+  std::uint32_t map_pixels = MethodOptions{}.map_pixels;
   std::size_t rays = 256;
   void add_to(CLI::App& app, bool reach_required);
   Result<Reach> parse_reach() const;

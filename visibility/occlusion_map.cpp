@@ -65,6 +65,7 @@ OcclusionMap::OcclusionMap(const Scene& scene, const OccluderSet& occluders,
       guards_(guards),
       origin_(scene.bounds.empty() ? Vec3{0} : scene.bounds.centre()),
       near_m_(near_for(occluders.reach)),
+      sub_boxes_(scene, origin_),
       pieces_(make_pieces(scene, occluders, origin_)),
       solids_(occluders) {
   std::vector<Aabb> boxes;
@@ -275,10 +276,26 @@ std::vector<std::uint32_t> OcclusionMap::largest_pieces(const Cell& cell) const 
   return chosen;
 }
 
+/// Takes out what all of an object's smaller boxes show to be hidden.
+void OcclusionMap::keep_seen(const Cell& cell, const Scratch& scratch,
+                             std::vector<std::uint32_t>& found, Stats& stats) const {
+  if (sub_boxes_.tree().nodes.empty()) return;
+  std::vector<std::uint32_t> seen;
+  std::vector<std::uint32_t> none;
+  std::erase_if(found, [&](std::uint32_t id) {
+    const std::uint32_t node = sub_boxes_.node_of(id);
+    if (node == SubBoxes::kNone) return false;
+    seen.clear();
+    find_visible_children(sub_boxes_.tree(), node, cell.single, scratch.cube, seen, none, stats);
+    return seen.empty();
+  });
+}
+
 void OcclusionMap::find(const Cell& cell, Scratch& scratch, Stats& stats) const {
   if (objects_.nodes.empty()) return;
   if (options_.threads <= 1) {
     find_visible(objects_, 0, cell.single, scratch.cube, scratch.visible, stats);
+    keep_seen(cell, scratch, scratch.visible, stats);
     return;
   }
   // The tree's upper levels alone, then each subtree as a task: the same tests as in one thread.
@@ -289,6 +306,7 @@ void OcclusionMap::find(const Cell& cell, Scratch& scratch, Stats& stats) const 
       find_visible_children(objects_, r, cell.single, scratch.cube, scratch.visible, next, stats);
     roots = std::move(next);
   }
+  keep_seen(cell, scratch, scratch.visible, stats);
   std::vector<std::vector<std::uint32_t>> found(roots.size());
   std::vector<Stats> counts(roots.size());
   tbb::task_arena arena(
@@ -296,6 +314,7 @@ void OcclusionMap::find(const Cell& cell, Scratch& scratch, Stats& stats) const 
   arena.execute([&] {
     tbb::parallel_for(std::size_t{0}, roots.size(), [&](std::size_t i) {
       find_visible(objects_, roots[i], cell.single, scratch.cube, found[i], counts[i]);
+      keep_seen(cell, scratch, found[i], counts[i]);
     });
   });
   for (std::size_t i = 0; i < roots.size(); ++i) {

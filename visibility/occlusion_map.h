@@ -9,6 +9,7 @@
 #include "visibility/method.h"
 #include "visibility/occluder_pieces.h"
 #include "visibility/solid_index.h"
+#include "visibility/sub_boxes.h"
 
 namespace ivis {
 
@@ -53,6 +54,8 @@ class OcclusionMap : public Method {
   void draw_piece(const OccluderPieces::Piece& piece, std::uint32_t sides, const Cell& cell,
                   Scratch& scratch, Stats& stats) const;
   std::vector<std::uint32_t> largest_pieces(const Cell& cell) const;
+  void keep_seen(const Cell& cell, const Scratch& scratch, std::vector<std::uint32_t>& found,
+                 Stats& stats) const;
   void find(const Cell& cell, Scratch& scratch, Stats& stats) const;
   std::unique_ptr<Scratch> take_scratch() const;
   void give_back(std::unique_ptr<Scratch> scratch) const;
@@ -65,6 +68,7 @@ class OcclusionMap : public Method {
   float near_m_;
   BoxTree objects_;
   std::vector<ObjectId> always_visible_;
+  SubBoxes sub_boxes_;
   OccluderPieces pieces_;
   SolidIndex solids_;
   mutable std::mutex scratch_mutex_;

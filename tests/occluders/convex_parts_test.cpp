@@ -48,7 +48,8 @@ TEST(ConvexParts, CoverRandomStars) {
       ring.emplace_back(1e4 + radius(random) * std::cos(a), radius(random) * std::sin(a));
     }
     if (area(Polygon{{ring}}) < 0) std::reverse(ring.begin(), ring.end());
-    // Stars whose radius differs in x and y may cross themselves: only those that do not are polygons.
+    // Stars whose radius differs in x and y may cross themselves: only those that do not are
+    // polygons.
     bool simple = true;
     for (std::size_t i = 0; i < ring.size(); ++i) {
       const Vec2 a = ring[i] - Vec2{1e4, 0};
@@ -66,7 +67,9 @@ TEST(MeshOfPrism, IsClosedAndFacesOutwards) {
   double volume = 0;
   for (const auto& f : mesh.faces)
     for (const auto& t : {std::array<std::size_t, 3>{0, 1, 2}, std::array<std::size_t, 3>{0, 2, 3}})
-      volume += glm::dot(mesh.points[f[t[0]]], glm::cross(mesh.points[f[t[1]]], mesh.points[f[t[2]]])) / 6;
+      volume +=
+          glm::dot(mesh.points[f[t[0]]], glm::cross(mesh.points[f[t[1]]], mesh.points[f[t[2]]])) /
+          6;
   EXPECT_NEAR(volume, 7 * 3, 1e-9);
   EXPECT_TRUE(mesh_of(Prism{prism.footprint, 5, 5, 0, false}).empty());
 }

@@ -68,13 +68,15 @@ class DepthCubeTest : public ::testing::Test {
 };
 
 TEST_F(DepthCubeTest, AnEmptyCubeHidesNothing) {
-  EXPECT_EQ(visible(cube_, {box({50, 0, 0}, 1), box({0, -50, 0}, 1), box({0, 0, 0}, 1)}).size(), 3U);
+  EXPECT_EQ(visible(cube_, {box({50, 0, 0}, 1), box({0, -50, 0}, 1), box({0, 0, 0}, 1)}).size(),
+            3U);
 }
 
 TEST_F(DepthCubeTest, AWallHidesWhatLiesWhollyBehindItAndNothingElse) {
   draw({wall(20, -10, 10, -10, 10)});
-  const std::vector<Aabb> boxes{box({40, 0, 0}, 1),     box({19, 0, 0}, 0.5),  box({20, 0, 0}, 0.5),
-                                box({40, 20.5, 0}, 1),  box({40, 0, 22}, 3),   box({-40, 0, 0}, 1),
+  const std::vector<Aabb> boxes{box({40, 0, 0}, 1),         box({19, 0, 0}, 0.5),
+                                box({20, 0, 0}, 0.5),       box({40, 20.5, 0}, 1),
+                                box({40, 0, 22}, 3),        box({-40, 0, 0}, 1),
                                 {{30, -5, -5}, {60, 5, 5}}, {{10, -1, -1}, {40, 1, 1}}};
   EXPECT_EQ(visible(cube_, boxes), (std::vector<std::uint32_t>{1, 2, 3, 4, 5, 7}));
 }
@@ -103,7 +105,8 @@ TEST_F(DepthCubeTest, EveryDirectionWorksAlike) {
       Vec3 behind{0};
       behind[axis] = static_cast<double>(40 * sign);
       Vec3 opposite = -behind;
-      EXPECT_EQ(visible(cube_, {box(behind, 1), box(opposite, 1)}), (std::vector<std::uint32_t>{1})) << axis << ' ' << sign;
+      EXPECT_EQ(visible(cube_, {box(behind, 1), box(opposite, 1)}), (std::vector<std::uint32_t>{1}))
+          << axis << ' ' << sign;
     }
 }
 
@@ -116,7 +119,8 @@ TEST_F(DepthCubeTest, BackFacesAreNotDrawn) {
 
 TEST_F(DepthCubeTest, WhatIsNearerThanTheNearDistanceIsVisible) {
   draw({wall(0.2F, -10, 10, -10, 10)});
-  EXPECT_EQ(visible(cube_, {box({0.8, 0, 0}, 0.1), box({5, 0, 0}, 1)}), (std::vector<std::uint32_t>{0}));
+  EXPECT_EQ(visible(cube_, {box({0.8, 0, 0}, 0.1), box({5, 0, 0}, 1)}),
+            (std::vector<std::uint32_t>{0}));
 }
 
 TEST_F(DepthCubeTest, ClearingForgets) {
@@ -140,8 +144,8 @@ TEST_F(DepthCubeTest, ASheetSeenAtASlantHidesOnlyWhatIsBehindItsFarthestDepthInA
   EXPECT_EQ(visible(cube_, {box({30, 0, 0}, 1)}).size(), 0U);
 }
 
-/// The oracle: the largest K / w of all faces in front at a pixel's centre, in doubles; `inner` shrinks the faces'
-/// edges by so much, relative to their distance.
+/// The oracle: the largest K / w of all faces in front at a pixel's centre, in doubles; `inner`
+/// shrinks the faces' edges by so much, relative to their distance.
 double oracle(const std::vector<Corners>& faces, const Vec3& d, double inner) {
   double best = 0;
   for (const Corners& f : faces) {
@@ -173,7 +177,8 @@ TEST_F(DepthCubeTest, NeverClaimsMoreThanRaysThroughPixelCentresFindNorMuchLess)
     for (int f = 0; f < 40; ++f) {
       const glm::vec3 at{place(random), place(random), place(random)};
       glm::vec3 u = glm::normalize(glm::vec3{place(random), place(random), place(random)});
-      const glm::vec3 v = glm::normalize(glm::cross(u, glm::vec3{place(random), place(random), place(random)}));
+      const glm::vec3 v =
+          glm::normalize(glm::cross(u, glm::vec3{place(random), place(random), place(random)}));
       const float a = side(random);
       const float b = side(random);
       Corners p{{at, at + a * u, at + a * u + b * v, at + b * v}};
@@ -188,15 +193,18 @@ TEST_F(DepthCubeTest, NeverClaimsMoreThanRaysThroughPixelCentresFindNorMuchLess)
     for (std::uint32_t s = 0; s < 6; ++s)
       for (std::uint32_t j = 0; j < n; j += 3)
         for (std::uint32_t i = 0; i < n; i += 3) {
-          const std::uint32_t b = s * cube_.blocks_a_face() + j / 16 * cube_.blocks_a_row() + i / 16;
+          const std::uint32_t b =
+              s * cube_.blocks_a_face() + j / 16 * cube_.blocks_a_row() + i / 16;
           const int q = cube_.is_touched(b) ? cube_.block(b)[j % 16 * 16 + i % 16] + 32768 : 0;
           const double u = (2.0 * i + 1) / n - 1;
           const double v = (2.0 * j + 1) / n - 1;
           const double w = s % 2 == 0 ? 1 : -1;
           const Vec3 d = s / 2 == 0 ? Vec3{w, v, u} : s / 2 == 1 ? Vec3{u, w, v} : Vec3{u, v, w};
-          ASSERT_LE(q, std::min(65535.0, k * oracle(faces, d, -1e-5))) << "side " << s << " pixel " << i << ',' << j;
+          ASSERT_LE(q, std::min(65535.0, k * oracle(faces, d, -1e-5)))
+              << "side " << s << " pixel " << i << ',' << j;
           const double least = k * oracle(faces, d, 1e-5);
-          ASSERT_GE(q, std::min(65535.0, std::floor(least * 0.995)) - 1) << "side " << s << " pixel " << i << ',' << j;
+          ASSERT_GE(q, std::min(65535.0, std::floor(least * 0.995)) - 1)
+              << "side " << s << " pixel " << i << ',' << j;
           drawn += q > 0 ? 1 : 0;
         }
     EXPECT_GT(drawn, 1000U);
@@ -242,7 +250,9 @@ TEST_F(DepthCubeTest, EverySimdTargetGivesTheSameBits) {
     faces.push_back({{at, at + u, at + u + v, at + v}});
   }
   for (int i = 0; i < 800; ++i)
-    boxes.push_back(box({static_cast<double>(place(random)), static_cast<double>(place(random)), static_cast<double>(place(random))}, 0.5));
+    boxes.push_back(box({static_cast<double>(place(random)), static_cast<double>(place(random)),
+                         static_cast<double>(place(random))},
+                        0.5));
   std::vector<std::int16_t> first;
   std::vector<std::uint32_t> first_visible;
   std::size_t targets = 0;
