@@ -297,6 +297,9 @@ Result<std::vector<Aabb>> find_void(const std::vector<ConvexPiece>& solids, cons
   for (const Vec3& s : seeds)
     if (bounds.contains(s)) starts.push_back({grid.index(s.x, 0), grid.index(s.y, 1), grid.index(s.z, 2)});
     else starts.push_back({0, 0, 0});
+  // With every seed inside matter nothing is known to be shut off from anybody.
+  if (std::none_of(starts.begin(), starts.end(), [&](const auto& v) { return grid.test(v[0], v[1], v[2]); }))
+    return std::vector<Aabb>{};
   flood(grid, std::move(starts));
   return boxes_of(grid);
 }

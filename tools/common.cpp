@@ -197,10 +197,15 @@ Status SolveArgs::check_files() const {
   return occluders.empty() ? ok() : check_input_file(occluders);
 }
 
-Result<OccluderSet> SolveArgs::get_occluders(const Scene& scene, const Reach& wanted, const Context& context) const {
+Result<OccluderSet> SolveArgs::get_occluders(const Scene& scene, const Reach& wanted, const std::vector<Vec3>& eyes, const Context& context) const {
   if (occluders.empty()) {
     ShrinkOptions options;
     options.reach = wanted;
+    options.margins = method == "occlusion-map";
+    if (options.margins && !eyes.empty()) {
+      options.view_space = {ViewSpace::Kind::kInside, eyes};
+      options.skip_seeds_in_solids = true;
+    }
     auto shrunk = shrink(scene, options, FastEroder{}, context);
     if (!shrunk) return shrunk.error();
     return std::move(shrunk->set);
@@ -222,13 +227,14 @@ Result<std::unique_ptr<Method>> SolveArgs::make(const Scene& scene, const Occlud
 }
 
 Result<std::unique_ptr<Prepared>> prepare(const SceneArgs& scene, const SolveArgs& solve,
-                                          const Reach& reach, const Context& context) {
+                                          const Reach& reach, const std::vector<Vec3>& eyes,
+                                          const Context& context) {
   if (auto s = solve.check_files(); !s) return s.error();
   auto prepared = std::make_unique<Prepared>();
   auto loaded = scene.load(context);
   if (!loaded) return loaded.error();
   prepared->scene = std::move(*loaded);
-  auto set = solve.get_occluders(prepared->scene, reach, context);
+  auto set = solve.get_occluders(prepared->scene, reach, eyes, context);
   if (!set) return set.error();
   prepared->occluders = std::move(*set);
   auto method = solve.make(prepared->scene, prepared->occluders);
@@ -243,6 +249,13 @@ double percentile(std::vector<double> values, double p) {
   const std::size_t k = std::min(values.size() - 1, at == 0 ? 0 : at - 1);
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
   return values[k];
+}
+
+std::vector<Vec3> eyes_of(const std::vector<Pose>& path) {
+  std::vector<Vec3> eyes;
+  eyes.reserve(path.size());
+  for (const Pose& pose : path) eyes.push_back(pose.eye);
+  return eyes;
 }
 
 double median(std::vector<double> values) {

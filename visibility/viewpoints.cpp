@@ -122,9 +122,15 @@ std::shared_ptr<const FreeSpace::Pieces> FreeSpace::pieces_of(std::uint32_t inde
 }
 
 bool FreeSpace::inside_prism(const Vec3& p) const {
+  if (occluders_ == nullptr) return false;
   for (std::size_t i = 0; i < prism_bounds_.size(); ++i)
     if (prism_bounds_[i].contains(p) && contains(occluders_->solids[i].footprint, ground(p)))
       return true;
+  for (const ConvexSolid& c : occluders_->convex_solids)
+    if (c.bounds.contains(p) && contains(c, p)) return true;
+  // Where no observer gets to, whatever is there.
+  for (const Aabb& b : occluders_->closed_boxes)
+    if (b.contains(p)) return true;
   return false;
 }
 
