@@ -47,8 +47,8 @@ IVec3 voxel_of(const Vec3& p) {
 /// The free voxels where observers are. A seed in a marked voxel stands near a surface: it is taken
 /// to the free voxels about it that it sees. If it sees none, to all of them, on whichever side of
 /// the surface: that opens too much rather than too little.
-std::vector<IVec3> start_voxels(const VoxelGrid& grid, const ViewSpace& space, double tolerance,
-                                VoxelReport& report) {
+Result<std::vector<IVec3>> start_voxels(const VoxelGrid& grid, const ViewSpace& space,
+                                        double tolerance, VoxelReport& report) {
   std::vector<IVec3> starts;
   if (space.kind == ViewSpace::Kind::kOutside) starts.push_back({0, 0, 0});
   for (const Vec3& seed : space.seeds) {
@@ -63,14 +63,19 @@ std::vector<IVec3> start_voxels(const VoxelGrid& grid, const ViewSpace& space, d
       continue;
     }
     const std::size_t before = starts.size();
-    const std::int32_t most = std::max({grid.voxels().x, grid.voxels().y, grid.voxels().z});
     std::vector<IVec3> near;
-    for (std::int32_t r = 2; near.empty() && r <= 2 * most; r *= 2)
+    for (std::int32_t r = 2; near.empty() && r <= 16; r *= 2)
       for (std::int32_t z = v.z - r; z <= v.z + r; ++z)
         for (std::int32_t y = v.y - r; y <= v.y + r; ++y)
           for (std::int32_t x = v.x - r; x <= v.x + r; ++x)
             if (const IVec3 w{x, y, z}; grid.inside(w) && grid.label_at(w) != VoxelGrid::kMarked)
               near.push_back(w);
+    if (near.empty())
+      return invalid_argument("voxels of " + std::to_string(grid.cell) + " m: all of them about (" +
+                              std::to_string(seed.x) + "," + std::to_string(seed.y) + "," +
+                              std::to_string(seed.z) +
+                              "), a point of the view space, touch surfaces; expected a free one "
+                              "within 16 of it: take smaller voxels");
     for (const IVec3& w : near)
       walk_ray(grid, p, Vec3(w.x + 0.5, w.y + 0.5, w.z + 0.5) - p, tolerance,
                [&](std::uint32_t, const IVec3& at) {
@@ -278,7 +283,8 @@ Result<VoxelReport> add_voxel_solids(const Scene& scene, const VoxelOptions& opt
   const auto width = [](std::int32_t r) { return 2 * std::min(r, 1 << 29) + 1; };
   leak_options.least_size = {width(least.x), width(least.y), width(least.z)};
   const auto seeds = start_voxels(grid, space, leak_options.tolerance_m / cell, report);
-  const auto flooded = flood(grid, seeds, context);
+  if (!seeds) return seeds.error();
+  const auto flooded = flood(grid, *seeds, context);
   if (!flooded) return flooded.error();
   const std::size_t held = grid.bytes() + flooded->components.capacity() * sizeof(VoxelComponent);
   if (held > options.max_bytes)
