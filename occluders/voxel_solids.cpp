@@ -24,6 +24,7 @@ using State = LeakReport::State;
 
 constexpr std::int32_t kCube = BitWindow::kCube;
 constexpr std::int32_t kPiece = 32;  // voxels along a piece's side
+constexpr double kTrim = 0.05;       // share of a piece given up to have fewer faces
 constexpr double kBeyondM = 1e6;     // how far closed space is said to go on outside the grid
 
 /// Corners rounded to single precision relative to the scene's centre: a gap below this is
@@ -46,8 +47,8 @@ IVec3 voxel_of(const Vec3& p) {
 /// The free voxels where observers are. A seed in a marked voxel stands near a surface: it is taken
 /// to the free voxels about it that it sees. If it sees none, to all of them, on whichever side of
 /// the surface: that opens too much rather than too little.
-std::vector<IVec3> start_voxels(const VoxelGrid& grid, const ViewSpace& space, double tolerance,
-                                VoxelReport& report) {
+Result<std::vector<IVec3>> start_voxels(const VoxelGrid& grid, const ViewSpace& space,
+                                        double tolerance, VoxelReport& report) {
   std::vector<IVec3> starts;
   if (space.kind == ViewSpace::Kind::kOutside) starts.push_back({0, 0, 0});
   for (const Vec3& seed : space.seeds) {
@@ -62,14 +63,19 @@ std::vector<IVec3> start_voxels(const VoxelGrid& grid, const ViewSpace& space, d
       continue;
     }
     const std::size_t before = starts.size();
-    const std::int32_t most = std::max({grid.voxels().x, grid.voxels().y, grid.voxels().z});
     std::vector<IVec3> near;
-    for (std::int32_t r = 2; near.empty() && r <= 2 * most; r *= 2)
+    for (std::int32_t r = 2; near.empty() && r <= 16; r *= 2)
       for (std::int32_t z = v.z - r; z <= v.z + r; ++z)
         for (std::int32_t y = v.y - r; y <= v.y + r; ++y)
           for (std::int32_t x = v.x - r; x <= v.x + r; ++x)
             if (const IVec3 w{x, y, z}; grid.inside(w) && grid.label_at(w) != VoxelGrid::kMarked)
               near.push_back(w);
+    if (near.empty())
+      return invalid_argument("voxels of " + std::to_string(grid.cell) + " m: all of them about (" +
+                              std::to_string(seed.x) + "," + std::to_string(seed.y) + "," +
+                              std::to_string(seed.z) +
+                              "), a point of the view space, touch surfaces; expected a free one "
+                              "within 16 of it: take smaller voxels");
     for (const IVec3& w : near)
       walk_ray(grid, p, Vec3(w.x + 0.5, w.y + 0.5, w.z + 0.5) - p, tolerance,
                [&](std::uint32_t, const IVec3& at) {
@@ -178,6 +184,32 @@ BitCube cut(const BitCube& bits, const IVec3& lo, const IVec3& hi) {
   return out;
 }
 
+/// The set bits but for small boxes, of kTrim of the volume together: fewer corners, and any subset
+/// of an erosion is as safe.
+BitCube trimmed(const BitCube& bits) {
+  std::vector<VoxelBox> boxes = greedy_boxes(bits);
+  const auto volume = [](const VoxelBox& b) {
+    return static_cast<std::size_t>(b.hi.x - b.lo.x) * static_cast<std::size_t>(b.hi.y - b.lo.y) *
+           static_cast<std::size_t>(b.hi.z - b.lo.z);
+  };
+  std::stable_sort(boxes.begin(), boxes.end(),
+                   [&](const VoxelBox& a, const VoxelBox& b) { return volume(a) > volume(b); });
+  const double enough = (1 - kTrim) * static_cast<double>(count(bits));
+  BitCube out(bits.size(), 0);
+  std::size_t kept = 0;
+  for (const VoxelBox& b : boxes) {
+    if (static_cast<double>(kept) >= enough) break;
+    kept += volume(b);
+    const std::int32_t n = b.hi.x - b.lo.x;
+    const std::uint64_t mask = (n >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << n) - 1)
+                               << b.lo.x;
+    for (std::int32_t z = b.lo.z; z < b.hi.z; ++z)
+      for (std::int32_t y = b.lo.y; y < b.hi.y; ++y)
+        out[static_cast<std::size_t>(y + kCube * z)] |= mask;
+  }
+  return out;
+}
+
 struct CubeResult {
   std::vector<SolidPiece> pieces;
   std::vector<VoxelBox> closed;  // in voxels of the grid
@@ -251,7 +283,8 @@ Result<VoxelReport> add_voxel_solids(const Scene& scene, const VoxelOptions& opt
   const auto width = [](std::int32_t r) { return 2 * std::min(r, 1 << 29) + 1; };
   leak_options.least_size = {width(least.x), width(least.y), width(least.z)};
   const auto seeds = start_voxels(grid, space, leak_options.tolerance_m / cell, report);
-  const auto flooded = flood(grid, seeds, context);
+  if (!seeds) return seeds.error();
+  const auto flooded = flood(grid, *seeds, context);
   if (!flooded) return flooded.error();
   const std::size_t held = grid.bytes() + flooded->components.capacity() * sizeof(VoxelComponent);
   if (held > options.max_bytes)
@@ -379,16 +412,17 @@ Result<VoxelReport> add_voxel_solids(const Scene& scene, const VoxelOptions& opt
         for (std::size_t k = 0; k < elements.size(); ++k) {
           if (context.stopped()) return;
           left = erode_cube(window, elements[k], left);
-          const std::size_t kept = count(left);
-          out.kept[k] = kept + deep_count;
-          if (kept == 0) {
+          out.kept[k] = deep_count;
+          if (count(left) == 0) {
             for (std::size_t rest = k + 1; rest < elements.size(); ++rest)
               out.kept[rest] = deep_count;
             break;
           }
           for (std::size_t p = 0; p < cells.size(); ++p) {
-            const BitCube bits = cut(left, cells[p].first, cells[p].second);
-            if (count(bits) == 0) continue;
+            const BitCube bits = trimmed(cut(left, cells[p].first, cells[p].second));
+            const std::size_t kept = count(bits);
+            if (kept == 0) continue;
+            out.kept[k] += kept;
             FaceMesh mesh = boundary_rectangles(bits);
             if (FaceMesh boxes = box_faces(greedy_boxes(bits));
                 boxes.faces.size() < mesh.faces.size())

@@ -68,7 +68,8 @@ struct VoxelReport {
 ///            line from the flooded space that reaches a solid voxel has crossed an opaque
 ///            triangle, if no component was taken that leaks after all. Positions are rounded by
 ///            less than slack_m.
-/// Errors:    kInvalidArgument: cell size, too many voxels or bytes, no seed; kCancelled.
+/// Errors:    kInvalidArgument: cell size, too many voxels or bytes, no seed, a seed without a free
+///            voxel near it; kCancelled.
 /// Threads:   uses context.threads; the result does not depend on their number.
 /// Cost:      docs/erosion.md.
 Result<VoxelReport> add_voxel_solids(const Scene& scene, const VoxelOptions& options,

@@ -51,10 +51,23 @@ Outcome run(const Args& args) {
   if (args.json) {
     Json left_out = Json::object();
     for (const auto& [reason, count] : r.left_out) left_out[reason] = count;
-    print({{"occluders_in", r.occluders_in}, {"occluders_out", r.occluders_out}, {"left_out", left_out},
-           {"convex_solids", r.convex_solids}, {"convex_pieces", r.convex_pieces}, {"void_boxes", r.void_boxes}, {"sheet_planes", r.sheet_planes},
-           {"sheet_tiles", r.sheet_tiles}, {"sheet_faces", r.sheet_faces}, {"sheet_seconds", r.sheet_seconds},
-           {"volume_kept", r.volume_kept()}, {"seconds", r.seconds}});
+    Json out{{"occluders_in", r.occluders_in}, {"occluders_out", r.occluders_out}, {"left_out", left_out},
+             {"convex_solids", r.convex_solids}, {"convex_pieces", r.convex_pieces}, {"void_boxes", r.void_boxes},
+             {"sheet_planes", r.sheet_planes}, {"sheet_tiles", r.sheet_tiles}, {"sheet_faces", r.sheet_faces},
+             {"sheet_seconds", r.sheet_seconds},
+             {"volume_kept", r.volume_kept()}, {"seconds", r.seconds}};
+    if (r.voxels) {
+      const VoxelReport& v = *r.voxels;
+      Json leaks = Json::array();
+      for (const auto& l : v.leaks) leaks.push_back({{"where", to_json(l.where)}, {"volume_m3", l.volume_m3}, {"by_ray", l.by_ray}});
+      out["voxels"] = {{"cell_m", v.cell_m}, {"marked", v.marked}, {"reached", v.reached}, {"solid_m3", v.solid_m3},
+                       {"components", v.components}, {"too_thin", v.thin}, {"proven", v.proven},
+                       {"by_evidence", v.by_evidence}, {"leaking", v.leaking}, {"leaks", leaks}, {"rays", v.rays},
+                       {"seeds_moved", v.seeds_moved}, {"seeds_unclear", v.seeds_unclear}, {"kept_m3", v.kept_m3},
+                       {"faces", v.faces}, {"pieces", v.pieces}, {"closed_boxes", v.closed_boxes},
+                       {"peak_bytes", v.peak_bytes}, {"seconds", v.seconds}};
+    }
+    print(out);
     return kOk;
   }
   std::cout << r.occluders_in << " objects -> " << r.occluders_out << " shrunk prisms in " << r.seconds << " s ("

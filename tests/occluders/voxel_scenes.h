@@ -45,13 +45,13 @@ inline Mat4 turned(double about_y, double about_x, const Vec3& to = Vec3{0}) {
   return m;
 }
 
-/// Opaque triangles that block.
+/// Opaque triangles that block and may be taken as occluders.
 inline std::vector<Triangle> blockers_of(const Scene& scene) {
   std::vector<Triangle> out;
   for (const auto* list : {&scene.objects, &scene.hidden_solids})
     for (const Object& o : *list)
       for (const Primitive& p : scene.mesh_of(o).primitives)
-        if (p.opaque)
+        if (p.opaque && o.tag != OccluderTag::kNever)
           for (std::uint32_t t = 0; t < p.triangles; ++t)
             out.push_back(world_triangle(scene, o, p.first_triangle + t));
   return out;
