@@ -7,7 +7,6 @@
 #include "occluders/convex.h"
 #include "occluders/progress.h"
 #include "occluders/sheets.h"
-#include "occluders/void_space.h"
 
 namespace ivis {
 namespace {
@@ -29,28 +28,14 @@ bool taken_whole(const ObjectSolids& found) {
 // In towns what is convex is mostly a prism and thick, and hides better as a solid. In rooms walls
 // are thin and what the file marks as matter is cut at all angles.
 bool sheets_promise_gain(const std::vector<ConvexPiece>& pieces, const ViewSpace& space) {
+  if (space.kind == ViewSpace::Kind::kInside) return true;
   std::size_t only = 0;
   std::size_t odd = 0;
-  std::size_t slanted = 0;
   for (const ConvexPiece& p : pieces) {
     only += p.only ? 1 : 0;
     odd += p.only && !p.upright_prism ? 1 : 0;
-    slanted += p.upright_prism ? 0 : 1;
   }
-  if (space.kind == ViewSpace::Kind::kInside && slanted * 4 >= pieces.size()) return true;
   return only > 0 && only * 2 >= pieces.size() && odd * 4 >= only;
-}
-
-ConvexSolid as_solid(const Aabb& b) {
-  ConvexSolid solid;
-  solid.bounds = b;
-  for (int i = 0; i < 3; ++i) {
-    Vec3 n{0};
-    n[i] = 1;
-    solid.planes.push_back({n, b.hi[i]});
-    solid.planes.push_back({-n, -b.lo[i]});
-  }
-  return solid;
 }
 
 }  // namespace
@@ -85,7 +70,7 @@ Status add_convex_and_sheets(const Scene& scene, const std::vector<const Object*
     for (ConvexPiece& piece : found[i].pieces) {
       if (!piece.upright_prism || prisms[i].prisms.empty()) {
         for (std::size_t s = 0; s < options.view_space.seeds.size(); ++s)
-          if (!options.skip_seeds_in_solids && contains(piece.solid, options.view_space.seeds[s])) {
+          if (contains(piece.solid, options.view_space.seeds[s])) {
             const std::string& name = scene.name_of(*objects[i]);
             return invalid_argument(
                 "view space seed " + std::to_string(s) + " lies inside the solid of node " +
@@ -111,15 +96,6 @@ Status add_convex_and_sheets(const Scene& scene, const std::vector<const Object*
       (options.sheets == SheetUse::kAuto && !sheets_promise_gain(pieces, options.view_space)))
     return ok();
   const auto start = std::chrono::steady_clock::now();
-  if (options.view_space.kind == ViewSpace::Kind::kInside) {
-    const auto boxes = find_void(pieces, options.view_space.seeds, {}, context);
-    if (!boxes) return boxes.error();
-    for (const Aabb& b : *boxes) {
-      pieces.push_back({as_solid(b), true, false, true});
-      set.closed_boxes.push_back(b);
-    }
-    report.void_boxes = boxes->size();
-  }
   SheetOptions sheet_options;
   sheet_options.radii_m = sheet_radii(largest_move(options.reach, set.slack_m));
   SheetReport sheets;

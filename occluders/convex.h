@@ -23,8 +23,6 @@ struct ConvexPiece {
   bool upright_prism = false;
   /// Of an object marked `only`.
   bool only = false;
-  /// Void that matter shuts off (void_space.h): as good as matter behind a surface, but shows no face.
-  bool filler = false;
 };
 
 struct ObjectConvex {

@@ -141,7 +141,6 @@ double ring_area(const std::vector<Vec3>& ring) {
 std::vector<PlaneGroup> group_faces(const std::vector<ConvexPiece>& solids) {
   std::map<std::array<std::int64_t, 4>, PlaneGroup> groups;
   for (std::size_t s = 0; s < solids.size(); ++s) {
-    if (solids[s].filler) continue;
     auto rings = face_rings(solids[s].solid);
     for (std::size_t f = 0; f < rings.size(); ++f) {
       if (rings[f].size() < 3) continue;

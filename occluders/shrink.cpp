@@ -183,7 +183,7 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
       const Aabb box = p.bounds();
       for (std::size_t s = 0; s < options.view_space.seeds.size(); ++s) {
         const Vec3& seed = options.view_space.seeds[s];
-        if (!options.skip_seeds_in_solids && box.contains(seed) && seed.y > p.bottom && seed.y < p.top &&
+        if (box.contains(seed) && seed.y > p.bottom && seed.y < p.top &&
             contains(p.footprint, ground(seed)))
           return invalid_argument("view space seed " + std::to_string(s) + " (" + text(seed) +
                                   ") lies inside the solid of " + describe(scene, *objects[i]));

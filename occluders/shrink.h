@@ -29,7 +29,6 @@ struct ShrinkReport {
   std::map<std::string, std::size_t> left_out;  ///< reason -> objects (or pieces)
   std::size_t convex_solids = 0;                ///< that are no upright prisms
   std::size_t convex_pieces = 0;                ///< of these, what the reach leaves
-  std::size_t void_boxes = 0;  ///< of space that convex solids shut off from the observers
   std::size_t sheet_planes = 0;
   std::size_t sheet_tiles = 0;
   std::size_t sheet_faces = 0;  ///< of all levels
@@ -48,8 +47,6 @@ enum class SheetUse : std::uint8_t { kAuto, kOff, kOn };
 struct ShrinkOptions {
   Reach reach;
   ViewSpace view_space;
-  /// Leave out seeds of the view space that lie in a solid, instead of refusing them.
-  bool skip_seeds_in_solids = false;
   /// Also make what the occlusion map draws.
   bool margins = true;
   std::vector<double> margins_m{};  ///< empty: default_margins() of the reach

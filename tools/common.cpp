@@ -146,10 +146,14 @@ void SolveArgs::add_to(CLI::App& app, bool reach_required) {
   app.add_option("--occluders", occluders, "shrunk occluders, made by 'ivis shrink' (default: shrink now)")->type_name("F.ivo");
   app.add_option("--threads", threads, "threads of one solve; the result does not depend on it")->capture_default_str()->check(CLI::Range(1, 256));
   app.add_option("--max-occluders", max_occluders, "draw only the N occluders of largest projected area; 0: all that show")->capture_default_str()->check(CLI::NonNegativeNumber);
-  app.add_option("--map-pixels", map_pixels, "pixels a side of the occlusion map's six faces, a multiple of 16 from 64 to 4096: more hide more and cost more")
-      ->capture_default_str()
-      ->check(number_within(64, 4096))
-      ->check(CLI::Validator([](const std::string& text) { return std::stoul(text) % 16 == 0 ? "" : "'" + text + "' is not a multiple of 16"; }, "MULTIPLE OF 16"));
+  app.add_option("--map-pixels", map_pixels, "pixels a side of the occlusion map's six faces, a multiple of 16 from 64 to 4096: more hide more and cost more "
+                 "(default: 512, or 1024 for reaches below 0.5 m)")
+      ->check([](const std::string& text) -> std::string {
+        std::string value = text;
+        const std::string wrong = number_within(64, 4096)(value);
+        if (!wrong.empty()) return wrong;
+        return std::stod(text) == 16 * std::floor(std::stod(text) / 16) ? "" : "'" + text + "' is not a multiple of 16";
+      }, "PIXELS");
   app.add_option("--reference-rays", rays, "aimed rays an object of the method 'reference'")->capture_default_str()->check(CLI::Range(1, 1000000));
 }
 
@@ -197,15 +201,10 @@ Status SolveArgs::check_files() const {
   return occluders.empty() ? ok() : check_input_file(occluders);
 }
 
-Result<OccluderSet> SolveArgs::get_occluders(const Scene& scene, const Reach& wanted, const std::vector<Vec3>& eyes, const Context& context) const {
+Result<OccluderSet> SolveArgs::get_occluders(const Scene& scene, const Reach& wanted, const Context& context) const {
   if (occluders.empty()) {
     ShrinkOptions options;
     options.reach = wanted;
-    options.margins = method == "occlusion-map";
-    if (options.margins && !eyes.empty()) {
-      options.view_space = {ViewSpace::Kind::kInside, eyes};
-      options.skip_seeds_in_solids = true;
-    }
     auto shrunk = shrink(scene, options, FastEroder{}, context);
     if (!shrunk) return shrunk.error();
     return std::move(shrunk->set);
@@ -227,14 +226,13 @@ Result<std::unique_ptr<Method>> SolveArgs::make(const Scene& scene, const Occlud
 }
 
 Result<std::unique_ptr<Prepared>> prepare(const SceneArgs& scene, const SolveArgs& solve,
-                                          const Reach& reach, const std::vector<Vec3>& eyes,
-                                          const Context& context) {
+                                          const Reach& reach, const Context& context) {
   if (auto s = solve.check_files(); !s) return s.error();
   auto prepared = std::make_unique<Prepared>();
   auto loaded = scene.load(context);
   if (!loaded) return loaded.error();
   prepared->scene = std::move(*loaded);
-  auto set = solve.get_occluders(prepared->scene, reach, eyes, context);
+  auto set = solve.get_occluders(prepared->scene, reach, context);
   if (!set) return set.error();
   prepared->occluders = std::move(*set);
   auto method = solve.make(prepared->scene, prepared->occluders);
@@ -249,13 +247,6 @@ double percentile(std::vector<double> values, double p) {
   const std::size_t k = std::min(values.size() - 1, at == 0 ? 0 : at - 1);
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
   return values[k];
-}
-
-std::vector<Vec3> eyes_of(const std::vector<Pose>& path) {
-  std::vector<Vec3> eyes;
-  eyes.reserve(path.size());
-  for (const Pose& pose : path) eyes.push_back(pose.eye);
-  return eyes;
 }
 
 double median(std::vector<double> values) {

@@ -80,9 +80,8 @@ struct SolveArgs {
   Result<Reach> parse_reach() const;
   /// Of what needs no scene. Errors: kIo.
   Status check_files() const;
-  /// The occluder file, or the scene shrunk here and now by the fast builder. `eyes`: where observers are going to be; the
-  /// occlusion map's occluders take what is shut off from them for solid.
-  Result<OccluderSet> get_occluders(const Scene& scene, const Reach& reach, const std::vector<Vec3>& eyes, const Context& context) const;
+  /// The occluder file, or the scene shrunk here and now by the fast builder.
+  Result<OccluderSet> get_occluders(const Scene& scene, const Reach& reach, const Context& context) const;
   Result<std::unique_ptr<Method>> make(const Scene& scene, const OccluderSet& set) const;
 };
 
@@ -98,10 +97,7 @@ struct Prepared {
 };
 /// Scene, then occluders for it, then a method over both.
 Result<std::unique_ptr<Prepared>> prepare(const SceneArgs& scene, const SolveArgs& solve,
-                                          const Reach& reach, const std::vector<Vec3>& eyes,
-                                          const Context& context);
-
-std::vector<Vec3> eyes_of(const std::vector<Pose>& path);
+                                          const Reach& reach, const Context& context);
 
 double median(std::vector<double> values);
 double percentile(std::vector<double> values, double p);

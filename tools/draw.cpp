@@ -101,7 +101,7 @@ Outcome run(const Args& args) {
   const auto eye = parse_point(args.eye);
   if (!eye) return eye.error();
   if (auto s = check_output_file(args.out); !s) return s.error();
-  const auto prepared = prepare(args.scene, args.solve, *reach, {*eye}, make_context(false));
+  const auto prepared = prepare(args.scene, args.solve, *reach, make_context(false));
   if (!prepared) return prepared.error();
   const auto& [scene, occluders, method] = **prepared;
   const auto pvs = method->solve({*eye, *reach});

@@ -117,7 +117,7 @@ Outcome run(const Args& args) {
   if (!args.dump.empty())
     if (auto s = check_output_folder(args.dump); !s) return s.error();
   const Context context = make_context(args.json);
-  const auto prepared = prepare(args.scene, args.solve, *reach, args.eye.empty() ? eyes_of(path) : std::vector<Vec3>{cell.eye}, context);
+  const auto prepared = prepare(args.scene, args.solve, *reach, context);
   if (!prepared) return prepared.error();
   const auto& [scene, occluders, method] = **prepared;
   return args.eye.empty() ? along_path(args, path, scene, *method, *reach, context)

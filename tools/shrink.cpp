@@ -52,7 +52,7 @@ Outcome run(const Args& args) {
     Json left_out = Json::object();
     for (const auto& [reason, count] : r.left_out) left_out[reason] = count;
     Json out{{"occluders_in", r.occluders_in}, {"occluders_out", r.occluders_out}, {"left_out", left_out},
-             {"convex_solids", r.convex_solids}, {"convex_pieces", r.convex_pieces}, {"void_boxes", r.void_boxes},
+             {"convex_solids", r.convex_solids}, {"convex_pieces", r.convex_pieces},
              {"sheet_planes", r.sheet_planes}, {"sheet_tiles", r.sheet_tiles}, {"sheet_faces", r.sheet_faces},
              {"sheet_seconds", r.sheet_seconds},
              {"volume_kept", r.volume_kept()}, {"seconds", r.seconds}};

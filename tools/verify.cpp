@@ -76,7 +76,7 @@ Outcome verify_path(const Args& args, const Context& context) {
   if (!reach) return reach.error();
   const auto path = read_path(args.path);
   if (!path) return path.error();
-  const auto prepared = prepare(args.scene, args.solve, *reach, eyes_of(*path), context);
+  const auto prepared = prepare(args.scene, args.solve, *reach, context);
   if (!prepared) return prepared.error();
   const auto& [scene, occluders, method] = **prepared;
   const Verifier verifier(scene, &occluders, blockers(args));
@@ -107,9 +107,7 @@ Outcome verify_record(const Args& args, const Context& context) {
     return input_error("'" + args.record.string() + "' is of " + std::to_string(record->objects) + " objects, the scene has " +
                        std::to_string(scene->objects.size()));
   if (record->frames.empty()) return input_error("'" + args.record.string() + "' holds no frame, so there is nothing to verify");
-  std::vector<Vec3> eyes;
-  for (const client::RecordedFrame& frame : record->frames) eyes.push_back(frame.eye);
-  const auto occluders = args.solve.get_occluders(*scene, record->reach, eyes, context);
+  const auto occluders = args.solve.get_occluders(*scene, record->reach, context);
   if (!occluders) return occluders.error();
   const Verifier verifier(*scene, &*occluders, blockers(args));
   Summary summary;

@@ -35,8 +35,9 @@ struct MethodOptions {
   unsigned threads = 1;
   /// Draw only so many occluders, those of largest projected area first; 0: all that are not hidden.
   std::size_t max_occluders = 0;
-  /// Occlusion map: pixels a side of each of its six faces, a multiple of 16 from 64 to 4096.
-  std::uint32_t map_pixels = 512;
+  /// Occlusion map: pixels a side of each of its six faces, a multiple of 16 from 64 to 4096. 0: 512, or 1024 for
+  /// reaches below half a metre, which a pixel's margin would add much to.
+  std::uint32_t map_pixels = 0;
   /// Reference method: aimed rays an object.
   std::size_t rays = 256;
   std::uint64_t seed = 1;

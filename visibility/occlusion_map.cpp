@@ -25,6 +25,12 @@ float near_for(const Reach& reach) {
   return static_cast<float>(std::clamp(4 * std::max({e.x, e.y, e.z}), 0.25, 4.0));
 }
 
+std::uint32_t pixels_for(std::uint32_t wanted, const Reach& reach) {
+  if (wanted != 0) return wanted;
+  const Vec3& e = reach.half_extents();
+  return std::max({e.x, e.y, e.z}) < 0.5 ? 1024 : 512;
+}
+
 }  // namespace
 
 /// The cell as the map wants it: relative to the origin, seen from its centre.
@@ -64,6 +70,7 @@ OcclusionMap::OcclusionMap(const Scene& scene, const OccluderSet& occluders,
       options_(options),
       guards_(guards),
       origin_(scene.bounds.empty() ? Vec3{0} : scene.bounds.centre()),
+      pixels_(pixels_for(options.map_pixels, occluders.reach)),
       near_m_(near_for(occluders.reach)),
       sub_boxes_(scene, origin_),
       pieces_(make_pieces(scene, occluders, origin_)),
@@ -97,7 +104,7 @@ const MethodTraits& OcclusionMap::traits() const {
 
 std::unique_ptr<OcclusionMap::Scratch> OcclusionMap::take_scratch() const {
   const std::lock_guard lock(scratch_mutex_);
-  if (scratch_.empty()) return std::make_unique<Scratch>(options_.map_pixels, near_m_);
+  if (scratch_.empty()) return std::make_unique<Scratch>(pixels_, near_m_);
   auto scratch = std::move(scratch_.back());
   scratch_.pop_back();
   return scratch;
@@ -208,7 +215,7 @@ void OcclusionMap::draw_piece(const OccluderPieces::Piece& piece, std::uint32_t 
                       std::abs(static_cast<double>(piece.hi[i]) - cell.eye[i]));
     across += far[i] * far[i];
   }
-  const auto pixels = static_cast<double>(options_.map_pixels);
+  const auto pixels = static_cast<double>(pixels_);
   const auto margin_at = [&](double w) { return kMarginFactor * w / pixels; };
   std::uint32_t level = 0;
   if (piece.kind == OccluderPieces::Kind::kSheet) {

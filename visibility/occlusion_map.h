@@ -65,6 +65,7 @@ class OcclusionMap : public Method {
   MethodOptions options_;
   OcclusionGuards guards_;
   Vec3 origin_;
+  std::uint32_t pixels_;
   float near_m_;
   BoxTree objects_;
   std::vector<ObjectId> always_visible_;
