@@ -2,7 +2,10 @@
 // a pose, interleaved round by round, and a hash of all answers, so that a fast wrong answer shows;
 // then the same by SIMD target.
 //
-//   occlusion_map_bench SCENE.glb PATH.csv REACH [ROUNDS] [PIXELS] [targets]
+//   occlusion_map_bench SCENE.glb PATH.csv REACH [ROUNDS] [PIXELS] [targets|turned]
+//
+// `targets` adds the time by SIMD target, `turned` the same scene and path turned by a rotation in
+// space.
 
 #include <algorithm>
 #include <cstdio>
@@ -18,6 +21,8 @@
 #include "occluders/shrink.h"
 #include "scenes/load.h"
 #include "visibility/occlusion_map.h"
+
+#include <glm/gtc/matrix_transform.hpp>
 
 namespace {
 
@@ -41,6 +46,22 @@ T get(Result<T> r) {
     std::exit(3);
   }
   return std::move(*r);
+}
+
+Mat4 turn() {
+  return glm::rotate(Mat4{1}, 0.7, glm::normalize(Vec3{1, 2, 3}));
+}
+
+Scene turned(const Scene& scene) {
+  Scene out;
+  out.meshes = scene.meshes;
+  out.node_names = scene.node_names;
+  for (Object o : scene.objects) {
+    o.to_world = turn() * o.to_world;
+    out.objects.push_back(o);
+  }
+  if (const auto s = finish_scene(out); !s) std::exit(3);
+  return out;
 }
 
 struct Subject {
@@ -93,7 +114,7 @@ int main(int argc, char** argv) {
   if (argc < 4) {
     std::fprintf(
         stderr,
-        "usage: occlusion_map_bench SCENE.glb PATH.csv REACH [ROUNDS] [PIXELS] [targets]\n");
+        "usage: occlusion_map_bench SCENE.glb PATH.csv REACH [ROUNDS] [PIXELS] [targets|turned]\n");
     return 2;
   }
   const std::vector<Pose> path = get(read_path(argv[2]));
@@ -107,6 +128,12 @@ int main(int argc, char** argv) {
   Scene scene = get(load_scene(argv[1]));
   std::vector<std::unique_ptr<Subject>> subjects;
   bench::Yardstick yardstick(scene);
+  const std::string extra = argc > 6 ? argv[6] : "";
+  std::vector<Pose> turned_path = path;
+  for (Pose& pose : turned_path)
+    pose.eye = Vec3(turn() * glm::dvec4(pose.eye, 1));
+  if (extra == "turned")
+    subjects.push_back(std::make_unique<Subject>("turned", turned(scene), reach, pixels));
   subjects.push_back(std::make_unique<Subject>("occlusion", std::move(scene), reach, pixels));
 
   std::vector<double> yard_ms;
@@ -119,7 +146,7 @@ int main(int argc, char** argv) {
       if (r == 0) yard_boxes.push_back(static_cast<double>(n));
     }
     for (auto& s : subjects)
-      s->run(path, reach, r == 0);
+      s->run(s->name == "turned" ? turned_path : path, reach, r == 0);
   }
   const double yard = median(yard_ms);
   std::printf("%zu poses, %d rounds, reach %s, %u pixels a face\n", path.size(), rounds, argv[3],
@@ -140,7 +167,7 @@ int main(int argc, char** argv) {
         s->stats.blocks_drawn / poses, s->stats.nodes_tested / poses);
   }
   for (const char* target : depth_targets()) {
-    if (argc <= 6 || !use_depth_target(target)) continue;
+    if (extra != "targets" || !use_depth_target(target)) continue;
     Subject& s = *subjects.front();
     s.ms.clear();
     s.run(path, reach, false);

@@ -36,9 +36,10 @@ std::vector<Polygon> within(const Polygon& polygon, const Vec2& lo, const Vec2& 
 }
 
 /// One stack's parts by grid cell.
-std::vector<PrismPiece> pieces_of(const FusedStack& stack, const Reach& padded_reach,
-                                  const Eroder& eroder, double part_m, const OccluderSet& set,
-                                  std::size_t& failed) {
+std::vector<PrismPiece> pieces_of(const FusedStack& stack,
+                                  const std::vector<std::vector<Polygon>>& eroded_by_reach,
+                                  const Reach& padded_reach, const Eroder& eroder, double part_m,
+                                  const OccluderSet& set, std::size_t& failed) {
   Aabb whole;
   for (const FusedLevel& level : stack.levels)
     whole.add(bounds_of(level.region));
@@ -59,18 +60,21 @@ std::vector<PrismPiece> pieces_of(const FusedStack& stack, const Reach& padded_r
   const auto cell = [](double v, double lo, double s, double n) {
     return static_cast<int>(std::clamp(std::floor((v - lo) / s), 0.0, n - 1));
   };
-  for (const FusedLevel& level : stack.levels) {
-    std::vector<Polygon> left = level.region;
+  for (std::size_t l = 0; l < stack.levels.size(); ++l) {
+    std::vector<Polygon> left = eroded_by_reach[l];
     for (std::size_t k = 0; k < set.margins_m.size() && !left.empty(); ++k) {
       const double margin = set.margins_m[k];
-      const double top = level.top - vertical - margin;
+      const double top = stack.levels[l].top - vertical - margin;
       const double raised = stack.bottom + vertical + margin;
       if (!reaches_down && raised >= top) break;
-      // E(E(region, V'), B(m)) = E(region, V' + B(m)): each margin goes on from the one before, whose outline is simpler.
-      const Reach step = k == 0 ? padded_reach.grown(margin, margin) : Reach::disc(margin - set.margins_m[k - 1]);
+      // E(E(F, V'), B(m)) = E(F, V' + B(m)): each margin goes on from the one before, whose
+      // outline is simpler.
+      const double step = k == 0 ? margin : margin - set.margins_m[k - 1];
       std::vector<Polygon> eroded;
-      for (const Polygon& polygon : left)
-        for (Polygon& piece : gated_erosion(polygon, step, eroder, kMinAreaM2, failed)) eroded.push_back(std::move(piece));
+      if (step == 0) eroded = left;
+      for (const Polygon& polygon : step == 0 ? std::vector<Polygon>{} : left)
+        for (Polygon& piece : gated_erosion(polygon, Reach::disc(step), eroder, kMinAreaM2, failed))
+          eroded.push_back(std::move(piece));
       for (const Polygon& polygon : eroded) {
         const Prism whole_prism{{}, std::min(raised, top), top, stack.bottom, stack.grounded};
         const auto part_of = [&](Polygon footprint) {
@@ -83,8 +87,10 @@ std::vector<PrismPiece> pieces_of(const FusedStack& stack, const Reach& padded_r
           continue;
         }
         const Aabb b = bounds_of({polygon});
-        for (int r = cell(b.lo.z, whole.lo.z, part.y, rows); r <= cell(b.hi.z, whole.lo.z, part.y, rows); ++r)
-          for (int c = cell(b.lo.x, whole.lo.x, part.x, columns); c <= cell(b.hi.x, whole.lo.x, part.x, columns); ++c) {
+        for (int r = cell(b.lo.z, whole.lo.z, part.y, rows);
+             r <= cell(b.hi.z, whole.lo.z, part.y, rows); ++r)
+          for (int c = cell(b.lo.x, whole.lo.x, part.x, columns);
+               c <= cell(b.hi.x, whole.lo.x, part.x, columns); ++c) {
             const Vec2 lo{whole.lo.x + c * part.x, whole.lo.z + r * part.y};
             for (Polygon& within_cell : within(polygon, lo, lo + part))
               if (area(within_cell) >= kMinAreaM2) add(k, c, r, part_of(std::move(within_cell)));
@@ -106,15 +112,17 @@ std::vector<double> default_margins(double radius_m) {
   return {0.1, 0.25, 0.5, 1, 2, 4};
 }
 
-std::size_t add_prism_ladder(const std::vector<FusedStack>& stacks, const Reach& padded_reach,
-                             const Eroder& eroder, const PrismLadderOptions& options,
-                             OccluderSet& set, const Context& context) {
+std::size_t add_prism_ladder(const std::vector<FusedStack>& stacks,
+                             const std::vector<std::vector<std::vector<Polygon>>>& eroded,
+                             const Reach& padded_reach, const Eroder& eroder,
+                             const PrismLadderOptions& options, OccluderSet& set,
+                             const Context& context) {
   std::vector<std::vector<PrismPiece>> found(stacks.size());
   std::atomic<std::size_t> failed{0};
   Progress progress(context, "margins", stacks.size());
   parallel_for(context, stacks.size(), [&](std::size_t i) {
     std::size_t missed = 0;
-    found[i] = pieces_of(stacks[i], padded_reach, eroder, options.part_m, set, missed);
+    found[i] = pieces_of(stacks[i], eroded[i], padded_reach, eroder, options.part_m, set, missed);
     failed += missed;
     progress.step();
   });

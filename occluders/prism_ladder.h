@@ -29,8 +29,12 @@ struct PrismLadderOptions {
 /// Errors:    none; what fails the distance check is left out and counted. Threads: uses
 /// context.threads. Cost:      about one erosion of the footprints a margin. Returns:   pieces that
 /// failed the distance check.
-std::size_t add_prism_ladder(const std::vector<FusedStack>& stacks, const Reach& padded_reach,
-                             const Eroder& eroder, const PrismLadderOptions& options,
-                             OccluderSet& set, const Context& context);
+/// `eroded`: of each stack and level, what the padded reach leaves of the footprints: E(E(F, V'),
+/// B(m)) = E(F, V' + B(m)).
+std::size_t add_prism_ladder(const std::vector<FusedStack>& stacks,
+                             const std::vector<std::vector<std::vector<Polygon>>>& eroded,
+                             const Reach& padded_reach, const Eroder& eroder,
+                             const PrismLadderOptions& options, OccluderSet& set,
+                             const Context& context);
 
 }  // namespace ivis

@@ -57,6 +57,7 @@ double lowest_y(const Scene& scene) {
 
 struct ShrunkStack {
   std::vector<Prism> prisms;
+  std::vector<std::vector<Polygon>> eroded;  ///< by level of the stack
   double volume = 0;
   std::size_t failed = 0;
   std::size_t thin = 0;
@@ -67,6 +68,7 @@ struct ShrunkStack {
 ShrunkStack shrink_stack(const FusedStack& stack, const OccluderSet& set, const Reach& grown,
                          const Eroder& eroder) {
   ShrunkStack out;
+  out.eroded.resize(stack.levels.size());
   const bool reaches_down = stack.grounded || stack.bottom <= set.floor;
   const double raised = stack.bottom + 2 * grown.half_extents().y;
   struct Piece {
@@ -87,6 +89,7 @@ ShrunkStack shrink_stack(const FusedStack& stack, const OccluderSet& set, const 
       if (eroded.empty() && out.failed == failed) ++out.thin;
       for (Polygon& piece : eroded) {
         const double a = area(piece);
+        out.eroded[static_cast<std::size_t>(stack.levels.rend() - level) - 1].push_back(piece);
         here.push_back({std::move(piece), a});
       }
     }
@@ -206,17 +209,19 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
     });
   }
   if (context.stopped()) return cancelled();
+  std::vector<std::vector<std::vector<Polygon>>> eroded;
   for (ShrunkStack& s : shrunk) {
     report.kept_volume += s.volume;
     if (s.failed > 0) report.left_out["failed distance check"] += s.failed;
     if (s.thin > 0) report.left_out["too thin for the reach"] += s.thin;
     for (Prism& p : s.prisms)
       set.shrunk.push_back(std::move(p));
+    eroded.push_back(std::move(s.eroded));
   }
   report.occluders_out = set.shrunk.size();
 
   if (options.margins) {
-    const std::size_t failed = add_prism_ladder(stacks, grown, eroder, {}, set, context);
+    const std::size_t failed = add_prism_ladder(stacks, eroded, grown, eroder, {}, set, context);
     if (failed > 0) report.left_out["failed distance check"] += failed;
     if (context.stopped()) return cancelled();
   }

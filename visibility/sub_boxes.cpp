@@ -11,7 +11,7 @@ namespace {
 constexpr double kLeastSizeM = 1;           ///< smaller objects have one box
 constexpr std::size_t kMostTriangles = 20000;  ///< larger meshes have one box: clusters are for them
 /// The parts' surfaces together must stay below this many times the one box's: those of what fills its box do not.
-constexpr double kWorthwhile = 2;
+constexpr double kWorthwhile = 1.1;
 
 using Ring = std::vector<Vec3>;
 
