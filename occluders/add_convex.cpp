@@ -82,9 +82,11 @@ Status add_convex_and_sheets(const Scene& scene, const std::vector<const Object*
     }
   }
   std::vector<SolidPiece> shrunk(odd.size());
+  const SceneSupport support(scene);
   if (options.margins)
-    parallel_for(context, odd.size(),
-                 [&](std::size_t k) { shrunk[k] = shrink_convex(odd[k], reach, set.margins_m); });
+    parallel_for(context, odd.size(), [&](std::size_t k) {
+      shrunk[k] = shrink_convex(odd[k], reach, set.margins_m, &support);
+    });
   for (SolidPiece& piece : shrunk)
     if (!piece.levels.empty()) set.solid_pieces.push_back(std::move(piece));
   report.convex_solids += odd.size();

@@ -337,11 +337,56 @@ ConvexSolid shrunk(const ConvexSolid& solid, const Reach& reach, double margin_m
   return result;
 }
 
+SceneSupport::SceneSupport(const Scene& scene) : scene_(scene) {
+  constexpr std::size_t kSamples = 256;
+  const std::size_t step = scene.objects.size() / kSamples + 1;
+  for (std::size_t i = 0; i < scene.objects.size(); i += step)
+    if (scene.mesh_of(scene.objects[i]).triangles() > 0)
+      samples_.push_back(world_triangle(scene, scene.objects[i], 0).a);
+}
+
+bool SceneSupport::within(const Vec3& normal, double offset) const {
+  for (const Vec3& p : samples_)
+    if (glm::dot(normal, p) > offset) return false;
+  const std::array<double, 3> key{normal.x, normal.y, normal.z};
+  {
+    const std::lock_guard lock(mutex_);
+    if (const auto known = support_.find(key); known != support_.end())
+      return known->second <= offset;
+  }
+  double most = -std::numeric_limits<double>::infinity();
+  for (const auto* list : {&scene_.objects, &scene_.hidden_solids})
+    for (const Object& o : *list) {
+      if (o.always_visible) return false;  // who knows where it goes
+      const Mesh& mesh = scene_.mesh_of(o);
+      for (const auto& p : mesh.positions)
+        most = std::max(most, glm::dot(normal, Vec3(o.to_world * glm::dvec4(Vec3(p), 1.0))));
+      if (mesh.positions.empty()) most = std::max(most, glm::dot(normal, Vec3(o.to_world[3])));
+      if (most > offset) return false;
+    }
+  const std::lock_guard lock(mutex_);
+  support_[key] = most;
+  return most <= offset;
+}
+
 SolidPiece shrink_convex(const ConvexSolid& solid, const Reach& reach,
-                         const std::vector<double>& margins_m) {
+                         const std::vector<double>& margins_m, const SceneSupport* scene) {
   SolidPiece piece;
+  std::vector<bool> is_floor(solid.planes.size(), false);
+  if (scene != nullptr) {
+    const Vec3 size = solid.bounds.size();
+    // The solid's planes lie a little inside its faces, and corners are rounded.
+    const double slack = 2e-6 * std::max({size.x, size.y, size.z}) + 1e-6;
+    for (std::size_t i = 0; i < solid.planes.size(); ++i) {
+      is_floor[i] = scene->within(solid.planes[i].normal, solid.planes[i].offset + slack);
+      if (is_floor[i]) piece.floors.push_back(solid.planes[i]);
+    }
+  }
   for (const double margin : margins_m) {
-    FaceMesh mesh = face_mesh(shrunk(solid, reach, margin));
+    ConvexSolid level = shrunk(solid, reach, margin);
+    for (std::size_t i = 0; i < solid.planes.size(); ++i)
+      if (is_floor[i]) level.planes[i].offset = solid.planes[i].offset;
+    FaceMesh mesh = face_mesh(level);
     if (mesh.empty()) break;
     piece.levels.push_back(std::move(mesh));
   }

@@ -1,7 +1,9 @@
 #pragma once
 // Convex closed pieces of meshes -> intersections of half-spaces, whole and shrunk.
 
+#include <array>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -59,8 +61,28 @@ FaceMesh face_mesh(const ConvexSolid& solid);
 /// Source: docs/erosion.md: planes move inwards by the support function.
 ConvexSolid shrunk(const ConvexSolid& solid, const Reach& reach, double margin_m);
 
+/// Finds out whether a plane bounds a whole scene: nothing that is drawn or blocks lies beyond it.
+/// Threads: const and reentrant. Ownership: borrows the scene.
+class SceneSupport {
+ public:
+  explicit SceneSupport(const Scene& scene);
+  /// Is every corner of every triangle in { x : normal.x <= offset }? Cost: usually a few hundred
+  /// products; those of all corners where the answer is yes, once for a normal.
+  bool within(const Vec3& normal, double offset) const;
+
+ private:
+  const Scene& scene_;
+  std::vector<Vec3> samples_;
+  mutable std::mutex mutex_;
+  mutable std::map<std::array<double, 3>, double> support_;
+};
+
 /// The solid at every margin, each level in E(solid, reach + B(margin)); ends where it vanishes.
+/// With `scene`, a plane beyond which the scene has nothing is a floor: it stays where it is, and
+/// the piece may be drawn for cells on its inner side only (SolidPiece::floors). No sight line from
+/// there to anything listed gets past that plane, so the solid might as well go on beyond it, and
+/// then loses nothing there (as docs/theory.md, 4, downward extension, but for any direction).
 SolidPiece shrink_convex(const ConvexSolid& solid, const Reach& reach,
-                         const std::vector<double>& margins_m);
+                         const std::vector<double>& margins_m, const SceneSupport* scene = nullptr);
 
 }  // namespace ivis

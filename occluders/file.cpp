@@ -77,6 +77,13 @@ class Writer {
     for (const double v : list)
       f64(v);
   }
+  void planes(const std::vector<ConvexSolid::Plane>& list) {
+    u32(list.size());
+    for (const ConvexSolid::Plane& plane : list) {
+      vec(plane.normal);
+      f64(plane.offset);
+    }
+  }
   void box(const Aabb& b) {
     vec(b.lo);
     vec(b.hi);
@@ -211,6 +218,15 @@ class Reader {
     if (!(std::abs(length - 1) < 1e-9)) fail(field, "length " + std::to_string(length), "1");
     return n;
   }
+  std::vector<ConvexSolid::Plane> planes(const char* field, std::size_t least) {
+    std::vector<ConvexSolid::Plane> list(count(field, 4, least, kPointBytes + 8));
+    for (ConvexSolid::Plane& plane : list) {
+      plane.normal = normal("normal of a plane");
+      plane.offset = f64("offset of a plane");
+      if (failed()) return {};
+    }
+    return list;
+  }
   HeightField height_field() {
     HeightField field;
     field.columns = static_cast<std::uint32_t>(integer(4, "columns"));
@@ -332,6 +348,7 @@ std::string encode_occluders(const OccluderSet& set) {
     out.u32(piece.levels.size());
     for (const FaceMesh& level : piece.levels)
       out.mesh(level);
+    out.planes(piece.floors);
   }
   out.numbers(set.sheet_radii_m);
   out.u64(set.sheets.size());
@@ -346,11 +363,7 @@ std::string encode_occluders(const OccluderSet& set) {
   out.u64(set.convex_solids.size());
   for (const ConvexSolid& solid : set.convex_solids) {
     out.box(solid.bounds);
-    out.u32(solid.planes.size());
-    for (const ConvexSolid::Plane& plane : solid.planes) {
-      out.vec(plane.normal);
-      out.f64(plane.offset);
-    }
+    out.planes(solid.planes);
   }
   out.u64(set.closed_boxes.size());
   for (const Aabb& b : set.closed_boxes)
@@ -419,9 +432,10 @@ Result<OccluderSet> decode_occluders(std::span<const std::byte> bytes, const std
       level = in.prisms("prisms of a piece");
     if (in.failed()) break;
   }
-  set.solid_pieces.resize(in.count("solid pieces", 8, 0, 4));
+  set.solid_pieces.resize(in.count("solid pieces", 8, 0, 8));
   for (SolidPiece& piece : set.solid_pieces) {
     piece.levels = in.meshes(set.margins_m.size());
+    piece.floors = in.planes("floors of a piece", 0);
     if (in.failed()) break;
   }
   set.sheet_radii_m = in.ladder("sheet radii");
@@ -436,11 +450,7 @@ Result<OccluderSet> decode_occluders(std::span<const std::byte> bytes, const std
   set.convex_solids.resize(in.count("convex solids", 8, 0, 2 * kPointBytes + 4));
   for (ConvexSolid& solid : set.convex_solids) {
     solid.bounds = in.box("box of a convex solid");
-    solid.planes.resize(in.count("planes of a convex solid", 4, 4, kPointBytes + 8));
-    for (ConvexSolid::Plane& plane : solid.planes) {
-      plane.normal = in.normal("normal of a plane");
-      plane.offset = in.f64("offset of a plane");
-    }
+    solid.planes = in.planes("planes of a convex solid", 4);
     if (in.failed()) break;
   }
   set.closed_boxes.resize(in.count("closed boxes", 8, 0, 2 * kPointBytes));

@@ -51,6 +51,16 @@ struct FaceMesh {
   bool empty() const { return faces.empty(); }
 };
 
+/// Intersection of half-spaces normal.x <= offset.
+struct ConvexSolid {
+  struct Plane {
+    Vec3 normal{0};
+    double offset = 0;
+  };
+  std::vector<Plane> planes;
+  Aabb bounds;
+};
+
 /// One part of the solids, small in extent, at every margin of OccluderSet::margins_m. A part that
 /// vanishes ends the list early or leaves an empty entry.
 struct PrismPiece {
@@ -58,6 +68,8 @@ struct PrismPiece {
 };
 struct SolidPiece {
   std::vector<FaceMesh> levels;  ///< closed meshes
+  /// The piece may be drawn for cells that lie wholly within these half-spaces only.
+  std::vector<ConvexSolid::Plane> floors;
 };
 
 /// Part of a plane in which nothing but opaque matter lies, shrunk within the plane by every radius
@@ -67,16 +79,6 @@ struct Sheet {
   Vec3 normal{0};     ///< unit
   double offset = 0;  ///< the plane is { x : normal.x = offset }
   std::vector<FaceMesh> levels;
-};
-
-/// Intersection of half-spaces normal.x <= offset.
-struct ConvexSolid {
-  struct Plane {
-    Vec3 normal{0};
-    double offset = 0;
-  };
-  std::vector<Plane> planes;
-  Aabb bounds;
 };
 
 /// Solid under a height that is constant over each cell of a grid; reaches down without end.

@@ -45,6 +45,12 @@ class Maker {
   void add_solid(const SolidPiece& piece) {
     OccluderPieces::Piece p;
     begin(p);
+    p.first_floor = static_cast<std::uint32_t>(out_.floors.size());
+    p.floors = static_cast<std::uint32_t>(piece.floors.size());
+    for (ConvexSolid::Plane plane : piece.floors) {
+      plane.offset -= glm::dot(plane.normal, out_.origin);
+      out_.floors.push_back(plane);
+    }
     for (const FaceMesh& mesh : piece.levels) {
       open_level();
       add_mesh(mesh);

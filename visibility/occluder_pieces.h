@@ -32,6 +32,8 @@ struct OccluderPieces {
     std::uint32_t first_real_level =
         0;  ///< of a floored or grounded prism: as it stands, where its rule does not hold
     glm::vec3 lo{0}, hi{0};  ///< of all that may be drawn
+    std::uint32_t first_floor = 0;  ///< of a solid: half-spaces that the cell must lie in
+    std::uint32_t floors = 0;
     // Of a sheet: it is { x : normal.x = offset } relative to the origin.
     Vec3 normal{0};
     double offset = 0;
@@ -42,6 +44,7 @@ struct OccluderPieces {
   std::vector<double> sheet_radii_m;
   std::vector<FaceBatch> batches;
   std::vector<Level> levels;
+  std::vector<ConvexSolid::Plane> floors;  ///< relative to `origin`
   std::vector<Piece> pieces;
   BoxTree tree;  ///< of the pieces; items are indices into `pieces`
 
