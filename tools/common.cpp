@@ -17,6 +17,9 @@
 
 #include "occluders/fast_erosion.h"
 #include "occluders/file.h"
+#ifdef IVIS_HAVE_GL
+#include "visibility/gl/gl_occlusion_map.h"
+#endif
 
 namespace ivis::tool {
 namespace {
@@ -143,6 +146,10 @@ void SolveArgs::add_to(CLI::App& app, bool reach_required) {
   for (const auto& t : method_list()) names.push_back(t.name);
   app.add_option("--method", method, methods)->capture_default_str()->type_name("M")->check(CLI::IsMember(names));
   app.add_option("--map", map, "sampling of the cull map")->capture_default_str()->check(CLI::IsMember({"polar", "orthographic"}));
+  app.add_option("--backend", backend,
+                 "what the occlusion map is computed on; auto: OpenGL where hardware does it, else the CPU")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "cpu", "gl"}));
   app.add_option("--occluders", occluders, "shrunk occluders, made by 'ivis shrink' (default: shrink now)")->type_name("F.ivo");
   app.add_option("--threads", threads, "threads of one solve; the result does not depend on it")->capture_default_str()->check(CLI::Range(1, 256));
   app.add_option("--max-occluders", max_occluders, "draw only the N occluders of largest projected area; 0: all that show")->capture_default_str()->check(CLI::NonNegativeNumber);
@@ -215,13 +222,21 @@ Result<OccluderSet> SolveArgs::get_occluders(const Scene& scene, const Reach& wa
   return std::move(*set);
 }
 
-Result<std::unique_ptr<Method>> SolveArgs::make(const Scene& scene, const OccluderSet& set) const {
+Result<std::unique_ptr<Method>> SolveArgs::make(const Scene& scene, const OccluderSet& set,
+                                                const Context& context) const {
   MethodOptions options;
   options.map = map == "polar" ? CullMapKind::kPolar : CullMapKind::kOrthographic;
   options.threads = threads;
   options.max_occluders = max_occluders;
   options.map_pixels = map_pixels;
   options.rays = rays;
+  options.backend = backend == "auto"  ? Backend::kAuto
+                    : backend == "cpu" ? Backend::kCpu
+                                       : Backend::kGl;
+  options.log = context.log;
+#ifdef IVIS_HAVE_GL
+  options.make_gl = make_gl_occlusion_map;
+#endif
   return make_method(method, scene, set, options);
 }
 
@@ -235,7 +250,7 @@ Result<std::unique_ptr<Prepared>> prepare(const SceneArgs& scene, const SolveArg
   auto set = solve.get_occluders(prepared->scene, reach, context);
   if (!set) return set.error();
   prepared->occluders = std::move(*set);
-  auto method = solve.make(prepared->scene, prepared->occluders);
+  auto method = solve.make(prepared->scene, prepared->occluders, context);
   if (!method) return method.error();
   prepared->method = std::move(*method);
   return prepared;

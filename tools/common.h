@@ -71,6 +71,7 @@ struct SolveArgs {
   std::string reach;
   std::string method = "cull-map";
   std::string map = "polar";
+  std::string backend = "auto";
   std::filesystem::path occluders;
   unsigned threads = 1;
   std::size_t max_occluders = 0;
@@ -82,7 +83,8 @@ struct SolveArgs {
   Status check_files() const;
   /// The occluder file, or the scene shrunk here and now by the fast builder.
   Result<OccluderSet> get_occluders(const Scene& scene, const Reach& reach, const Context& context) const;
-  Result<std::unique_ptr<Method>> make(const Scene& scene, const OccluderSet& set) const;
+  Result<std::unique_ptr<Method>> make(const Scene& scene, const OccluderSet& set,
+                                       const Context& context) const;
 };
 
 /// What most subcommands work on. Not movable: `method` borrows the rest.

@@ -41,7 +41,7 @@ Outcome one_eye(const Args& args, const Scene& scene, const Method& method, cons
   const MethodTraits& traits = method.traits();
   const char* guarantee = to_string(traits.guarantee);
   if (args.json) {
-    Json j{{"method", traits.name}, {"guarantee", guarantee}, {"objects", t->pvs.objects}, {"count", t->pvs.objects.size()},
+    Json j{{"method", traits.name}, {"backend", to_string(method.backend())}, {"guarantee", guarantee}, {"objects", t->pvs.objects}, {"count", t->pvs.objects.size()},
            {"total", scene.objects.size()}, {"compute_ms", t->compute_ms}, {"wall_ms", t->wall_ms}};
     if (!t->pvs.everything_because.empty()) j["everything_because"] = t->pvs.everything_because;
     print(j);
@@ -88,7 +88,7 @@ Outcome along_path(const Args& args, const std::vector<Pose>& path, const Scene&
     context.report("poses", row + 1, path.size());
   }
   if (args.json) {
-    print({{"poses", poses}, {"count_median", median(counts)}, {"compute_ms_median", median(compute)},
+    print({{"method", method.traits().name}, {"backend", to_string(method.backend())}, {"poses", poses}, {"count_median", median(counts)}, {"compute_ms_median", median(compute)},
            {"compute_ms_p99", percentile(compute, 0.99)}, {"wall_ms_median", median(wall)}});
     return kOk;
   }

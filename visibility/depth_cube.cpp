@@ -24,14 +24,6 @@ constexpr std::uint32_t kBlock = DepthCube::kBlock;
 constexpr float kInf = std::numeric_limits<float>::infinity();
 constexpr float kMostQ = 65535.0F;
 
-// A plane's distance c from the eye carries an absolute error of a few 2^-24 of the corners'
-// distance, and so does the product of its normal with a direction: 1/w is wrong by less than
-// kDepthGuard * distance / c of itself. Planes seen more edge-on than kEdgeOn are not drawn.
-constexpr float kDepthGuard = 4e-6F;
-constexpr float kEdgeOn = 4e-5F;
-constexpr float kPixelGuard = 0.01F;  ///< what a box is widened by, pixels
-constexpr float kRelative = 2e-6F;    ///< what a box is brought nearer by
-
 using D = hn::CappedTag<float, kW>;
 using DI = hn::RebindToSigned<D>;
 using DQ = hn::CappedTag<std::int16_t, kBlock>;

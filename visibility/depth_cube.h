@@ -19,6 +19,14 @@ struct alignas(64) FaceBatch {
       nz[kWidth];  ///< unit normal of the front; zero in lanes that are not in use
 };
 
+// A plane's distance c from the eye carries an absolute error of a few 2^-24 of the corners'
+// distance, and so does the product of its normal with a direction: 1/w is wrong by less than
+// kDepthGuard * distance / c of itself. Planes seen more edge-on than kEdgeOn are not drawn.
+inline constexpr float kDepthGuard = 4e-6F;
+inline constexpr float kEdgeOn = 4e-5F;
+inline constexpr float kPixelGuard = 0.01F;  ///< what a box is widened by, pixels
+inline constexpr float kRelative = 2e-6F;    ///< what a box is brought nearer by
+
 /// Six square maps of depth about an eye, the faces of a cube whose axes are the world's.
 ///
 /// Face 2a + s looks along axis a (0 x, 1 y, 2 z), s = 0 up, 1 down the axis. Depth w of a point is

@@ -1,5 +1,6 @@
 #include "visibility/method.h"
 
+#include "visibility/backend.h"
 #include "visibility/cull_map.h"
 #include "visibility/occlusion_map.h"
 #include "visibility/reference.h"
@@ -15,24 +16,36 @@ const char* to_string(Guarantee g) {
   return "unknown";
 }
 
+const char* to_string(Backend b) {
+  switch (b) {
+    case Backend::kAuto: return "auto";
+    case Backend::kCpu: return "cpu";
+    case Backend::kGl: return "gl";
+  }
+  return "unknown";
+}
+
 namespace {
+
+using Made = Result<std::unique_ptr<Method>>;
 
 struct Entry {
   MethodTraits traits;
-  std::unique_ptr<Method> (*make)(const Scene&, const OccluderSet&, const MethodOptions&);
+  Made (*make)(const Scene&, const OccluderSet&, const MethodOptions&);
+  bool has_gl = false;
 };
 
 const std::vector<Entry>& entries() {
   static const std::vector<Entry> all{
       {CullMap::make_traits(),
-       [](const Scene& s, const OccluderSet& o, const MethodOptions& m) -> std::unique_ptr<Method> {
-         return std::make_unique<CullMap>(s, o, m);
+       [](const Scene& s, const OccluderSet& o, const MethodOptions& m) -> Made {
+         return std::unique_ptr<Method>(std::make_unique<CullMap>(s, o, m));
        }},
-      {OcclusionMap::make_traits(),
-       [](const Scene& s, const OccluderSet& o, const MethodOptions& m) -> std::unique_ptr<Method> {
-         return std::make_unique<OcclusionMap>(s, o, m);
+      {OcclusionMap::make_traits(), make_occlusion_map, true},
+      {reference_traits(),
+       [](const Scene& s, const OccluderSet& o, const MethodOptions& m) -> Made {
+         return make_reference(s, o, m);
        }},
-      {reference_traits(), make_reference},
   };
   return all;
 }
@@ -53,6 +66,9 @@ Result<std::unique_ptr<Method>> make_method(std::string_view name, const Scene& 
       if (e.traits.needs_occluders && occluders.scene_hash != scene.hash)
         return mismatch("the occluders belong to another scene than the one loaded");
       if (auto sound = check_numbers(occluders); !sound) return sound.error();
+      if (options.backend == Backend::kGl && !e.has_gl)
+        return invalid_argument("method '" + e.traits.name +
+                                "' has no OpenGL backend; 'occlusion-map' has");
       return e.make(scene, occluders, options);
     }
     known += (known.empty() ? "" : ", ") + e.traits.name;

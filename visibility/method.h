@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -29,6 +30,22 @@ struct MethodTraits {
 /// Which map the cull map is sampled on.
 enum class CullMapKind { kPolar, kOrthographic };
 
+/// What the occlusion map is computed on.
+enum class Backend {
+  kAuto,  ///< OpenGL where it is built in and drawn by hardware, else and on any failure the CPU
+  kCpu,
+  kGl,    ///< OpenGL, by software if need be; an error where that fails
+};
+
+const char* to_string(Backend b);  ///< "auto", "cpu", "gl"
+
+class Method;
+struct MethodOptions;
+/// Makes the OpenGL occlusion map: hardware only for Backend::kAuto. Errors: kUnsupported, saying
+/// what is missing.
+using GlFactory = std::function<Result<std::unique_ptr<Method>>(const Scene&, const OccluderSet&,
+                                                                const MethodOptions&)>;
+
 struct MethodOptions {
   CullMapKind map = CullMapKind::kPolar;
   /// Threads inside one solve. The result has the same bits whatever the number.
@@ -38,6 +55,11 @@ struct MethodOptions {
   /// Occlusion map: pixels a side of each of its six faces, a multiple of 16 from 64 to 4096. 0: 512, or 1024 for
   /// reaches below half a metre, which a pixel's margin would add much to.
   std::uint32_t map_pixels = 0;
+  Backend backend = Backend::kAuto;
+  /// make_gl_occlusion_map of visibility/gl, from programs that link it; null: there is no OpenGL.
+  GlFactory make_gl;
+  /// Told once when Backend::kAuto does without OpenGL though it is built in; from any thread.
+  std::function<void(std::string_view)> log;
   /// Reference method: aimed rays an object.
   std::size_t rays = 256;
   std::uint64_t seed = 1;
@@ -50,6 +72,8 @@ class Method {
  public:
   virtual ~Method() = default;
   virtual const MethodTraits& traits() const = 0;
+  /// What the last answer was computed on.
+  virtual Backend backend() const { return Backend::kCpu; }
   /// Guarantee: traits().guarantee. Errors: kInvalidArgument if the cell's reach is larger than the
   /// occluders were shrunk for, or the eye is not finite.
   virtual Result<Pvs> solve(const ViewCell& cell) const = 0;
@@ -58,8 +82,9 @@ class Method {
 /// Traits of every registered method.
 std::vector<MethodTraits> method_list();
 
-/// Errors: kInvalidArgument naming `name` and the known ones, or what check_numbers() finds;
-/// kMismatch if the occluders belong to another scene. Cost: O(objects log objects).
+/// Errors: kInvalidArgument naming `name` and the known ones, what check_numbers() finds, or that the
+/// method has no OpenGL backend; kMismatch if the occluders belong to another scene; kUnsupported if
+/// Backend::kGl is asked for and does not work. Cost: O(objects log objects).
 Result<std::unique_ptr<Method>> make_method(std::string_view name, const Scene& scene,
                                             const OccluderSet& occluders,
                                             const MethodOptions& options = {});

@@ -17,31 +17,11 @@ namespace {
 /// A pixel's half diagonal at depth w of a map of n pixels a side is sqrt(2) w / n; 1 % more pays
 /// for rounding.
 constexpr double kMarginFactor = 1.01 * std::numbers::sqrt2;
-constexpr std::uint32_t kHorizontalSides = 0x33;  ///< that look along x and z
-
-/// Where 16 bits of depth should be spent: what is nearer than this counts as visible.
-float near_for(const Reach& reach) {
-  const Vec3& e = reach.half_extents();
-  return static_cast<float>(std::clamp(4 * std::max({e.x, e.y, e.z}), 0.25, 4.0));
-}
-
-std::uint32_t pixels_for(std::uint32_t wanted, const Reach& reach) {
-  if (wanted != 0) return wanted;
-  const Vec3& e = reach.half_extents();
-  return std::max({e.x, e.y, e.z}) < 0.5 ? 1024 : 512;
-}
 
 }  // namespace
 
-/// The cell as the map wants it: relative to the origin, seen from its centre.
-struct OcclusionMap::Cell {
-  Vec3 eye;
-  float single[3];
-  Reach reach;    ///< padded
-  double radius;  ///< of a ball about the eye that holds the cell
-  bool above_floor;
-  bool on_ground;
-  std::uint32_t sides;  ///< of the cube that are of use
+struct OcclusionMap::Cell : MapCell {
+  std::uint32_t sides = 0;  ///< of the cube that are of use
 };
 
 struct OcclusionMap::Scratch {
@@ -127,18 +107,7 @@ Result<Pvs> OcclusionMap::solve(const ViewCell& cell, Stats& stats) const {
     list_everything(scene_, std::move(why), pvs);
     return pvs;
   }
-  Cell c;
-  c.eye = cell.eye - origin_;
-  for (int i = 0; i < 3; ++i)
-    c.single[i] = static_cast<float>(c.eye[i]);
-  c.reach = padded(cell.reach, occluders_.slack_m);
-  const Vec3 half = c.reach.half_extents();
-  c.radius = largest_move(cell.reach, occluders_.slack_m);
-  const Aabb box{cell.eye - half, cell.eye + half};
-  c.above_floor = box.lo.y >= occluders_.floor;
-  const Aabb& ground = occluders_.ground;
-  c.on_ground = !ground.empty() && box.lo.x >= ground.lo.x && box.hi.x <= ground.hi.x &&
-                box.lo.z >= ground.lo.z && box.hi.z <= ground.hi.z;
+  Cell c{make_map_cell(cell, origin_, occluders_), 0};
 
   auto scratch = take_scratch();
   scratch->cube.clear();
@@ -163,7 +132,7 @@ void OcclusionMap::draw(const Cell& cell, Scratch& scratch, Stats& stats) const 
   const BoxTree& tree = pieces_.tree;
   if (tree.nodes.empty()) return;
   if (options_.max_occluders > 0 && options_.max_occluders < pieces_.pieces.size()) {
-    for (const std::uint32_t p : largest_pieces(cell))
+    for (const std::uint32_t p : largest_pieces(pieces_, cell.eye, options_.max_occluders))
       draw_piece(pieces_.pieces[p], cell.sides, cell, scratch, stats);
     return;
   }
@@ -205,82 +174,14 @@ void OcclusionMap::draw(const Cell& cell, Scratch& scratch, Stats& stats) const 
   }
 }
 
-/// At the first margin that covers a pixel at the piece's far side; not at all where none does.
 void OcclusionMap::draw_piece(const OccluderPieces::Piece& piece, std::uint32_t sides,
                               const Cell& cell, Scratch& scratch, Stats& stats) const {
-  double far[3];
-  double across = 0;  // squared distance of the farthest corner
-  for (int i = 0; i < 3; ++i) {
-    far[i] = std::max(std::abs(static_cast<double>(piece.lo[i]) - cell.eye[i]),
-                      std::abs(static_cast<double>(piece.hi[i]) - cell.eye[i]));
-    across += far[i] * far[i];
-  }
-  const auto pixels = static_cast<double>(pixels_);
-  const auto margin_at = [&](double w) { return kMarginFactor * w / pixels; };
-  std::uint32_t level = 0;
-  if (piece.kind == OccluderPieces::Kind::kSheet) {
-    // The rule and why it holds: occluders/sheets.h.
-    const double a = glm::dot(piece.normal, cell.eye) - piece.offset;
-    const double e = margin_at(std::max({far[0], far[1], far[2]}));
-    if (a <= 1.001 * cell.radius || a <= 1.001 * e) return;
-    double r = (cell.radius + e) * std::sqrt(across) / (a - e) * (1 + 1e-6);
-    if (!guards_.sheet_obliqueness) r = cell.radius + e;
-    while (level < piece.levels && pieces_.sheet_radii_m[level] < r)
-      ++level;
-  } else {
-    const double m = margin_at(std::max(far[0], far[2]));
-    if (guards_.pixel_margin)
-      while (level < piece.levels && pieces_.margins_m[level] < m)
-        ++level;
-    // A prism drawn far down may be deeper on the faces that look down than the margin allows.
-    if (level < piece.levels && guards_.pixel_margin &&
-        pieces_.margins_m[level] < margin_at(far[1]))
-      sides &= kHorizontalSides;
-  }
-  if (level >= piece.levels || sides == 0) return;
-  std::uint32_t first = piece.first_level;
-  if ((piece.kind == OccluderPieces::Kind::kFloored && !cell.above_floor) ||
-      (piece.kind == OccluderPieces::Kind::kGrounded && !cell.on_ground))
-    first = piece.first_real_level;
-  const OccluderPieces::Level& faces = pieces_.levels[first + level];
-  if (faces.batches == 0) return;
+  const SampleMargin margin{kMarginFactor, static_cast<double>(pixels_)};
+  const PieceChoice chosen = choose_level(pieces_, piece, cell, margin, sides, guards_);
+  if (chosen.sides == 0) return;
   ++stats.pieces_drawn;
-  draw_faces(pieces_.faces(faces), cell.single, sides, piece.kind == OccluderPieces::Kind::kSheet,
-             scratch.cube, stats);
-}
-
-/// The options_.max_occluders pieces of largest projected area, near ones first.
-std::vector<std::uint32_t> OcclusionMap::largest_pieces(const Cell& cell) const {
-  struct Candidate {
-    double area;
-    double distance;
-    std::uint32_t piece;
-  };
-  std::vector<Candidate> all;
-  for (std::uint32_t p = 0; p < pieces_.pieces.size(); ++p) {
-    const OccluderPieces::Piece& piece = pieces_.pieces[p];
-    const Vec3 size = Vec3(piece.hi) - Vec3(piece.lo);
-    Vec3 gap{0};
-    for (int i = 0; i < 3; ++i)
-      gap[i] = std::max({static_cast<double>(piece.lo[i]) - cell.eye[i],
-                         cell.eye[i] - static_cast<double>(piece.hi[i]), 0.0});
-    const double distance = std::max(glm::length(gap), 0.1);
-    all.push_back({glm::dot(size, size) / (distance * distance), distance, p});
-  }
-  const auto larger = [](const Candidate& a, const Candidate& b) {
-    return a.area != b.area ? a.area > b.area : a.piece < b.piece;
-  };
-  const auto nearer = [](const Candidate& a, const Candidate& b) {
-    return a.distance != b.distance ? a.distance < b.distance : a.piece < b.piece;
-  };
-  const auto end =
-      all.begin() + static_cast<std::ptrdiff_t>(std::min(options_.max_occluders, all.size()));
-  std::nth_element(all.begin(), end, all.end(), larger);
-  std::sort(all.begin(), end, nearer);
-  std::vector<std::uint32_t> chosen;
-  for (auto it = all.begin(); it != end; ++it)
-    chosen.push_back(it->piece);
-  return chosen;
+  draw_faces(pieces_.faces(pieces_.levels[chosen.level]), cell.single, chosen.sides,
+             piece.kind == OccluderPieces::Kind::kSheet, scratch.cube, stats);
 }
 
 /// Takes out what all of an object's smaller boxes show to be hidden.

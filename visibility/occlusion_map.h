@@ -7,20 +7,11 @@
 #include "visibility/box_tree.h"
 #include "visibility/depth_cube.h"
 #include "visibility/method.h"
-#include "visibility/occluder_pieces.h"
+#include "visibility/piece_choice.h"
 #include "visibility/solid_index.h"
 #include "visibility/sub_boxes.h"
 
 namespace ivis {
-
-/// Guards of the map that tests take out one by one to prove that the verifier has power. All on in
-/// use.
-struct OcclusionGuards {
-  bool pixel_margin =
-      true;  ///< draw a piece at the margin that covers a pixel at its far side, not at the least
-  bool sheet_obliqueness =
-      true;  ///< take a sheet's radius for the worst line of sight, not for a perpendicular one
-};
 
 /// The perspective occlusion map: shrunk occluders of every kind drawn into six maps of depth about
 /// the eye; what lies behind in all of them is hidden. Any scene, any direction of view. Guarantee:
@@ -53,7 +44,6 @@ class OcclusionMap : public Method {
   void draw(const Cell& cell, Scratch& scratch, Stats& stats) const;
   void draw_piece(const OccluderPieces::Piece& piece, std::uint32_t sides, const Cell& cell,
                   Scratch& scratch, Stats& stats) const;
-  std::vector<std::uint32_t> largest_pieces(const Cell& cell) const;
   void keep_seen(const Cell& cell, const Scratch& scratch, std::vector<std::uint32_t>& found,
                  Stats& stats) const;
   void find(const Cell& cell, Scratch& scratch, Stats& stats) const;

@@ -3,19 +3,21 @@
 #include <algorithm>
 #include <cmath>
 
-#include <gtest/gtest.h>
 #include <glm/gtc/matrix_transform.hpp>
+#include <gtest/gtest.h>
 
 #include "occluders/fast_erosion.h"
 #include "occluders/shrink.h"
 #include "tests/support/scene_builder.h"
 #include "tests/visibility/contract_scenes.h"
+#include "tests/visibility/thin_room.h"
 #include "visibility/verify.h"
 
 namespace ivis {
 namespace {
 
 using test::SceneBuilder;
+using test::thin_room;
 
 bool lists(const Pvs& pvs, ObjectId id) {
   return std::binary_search(pvs.objects.begin(), pvs.objects.end(), id);
@@ -134,28 +136,6 @@ TEST(OcclusionMapPower, TheVerifierFindsThatThePixelMarginIsSwitchedOff) {
   }
   EXPECT_EQ(with, 0U);
   EXPECT_GT(without, 0U);
-}
-
-/// A room of thin brushes, as a game's map has them, with a doorway, and boxes outside.
-Scene thin_room() {
-  SceneBuilder b;
-  const double t = 0.2;
-  const auto brush = [&](const Vec3& lo, const Vec3& hi) { b.add_box(lo, hi, OccluderTag::kOnly); };
-  brush({-4, 0, -4 - t}, {4, 3, -4});
-  brush({-4, 0, 4}, {4, 3, 4 + t});
-  brush({-4 - t, 0, -4}, {-4, 3, 4});
-  brush({4, 0, -4}, {4 + t, 3, -0.6});
-  brush({4, 0, 0.6}, {4 + t, 3, 4});
-  brush({4, 2.2, -0.6}, {4 + t, 3, 0.6});
-  brush({-4 - t, -t, -4 - t}, {4 + t, 0, 4 + t});
-  brush({-4 - t, 3, -4 - t}, {4 + t, 3 + t, 4 + t});
-  for (int i = 0; i < 400; ++i) {
-    const double angle = i * 0.5;
-    const Vec3 at{(8 + 0.05 * i) * std::cos(angle), 0.3 + i % 7 * 0.4,
-                  (8 + 0.05 * i) * std::sin(angle)};
-    b.add_box(at - 0.2, at + 0.2, OccluderTag::kNever);
-  }
-  return std::move(b).finish();
 }
 
 TEST(OcclusionMap, SheetsHideBehindWallsThinnerThanTheReachButNotThroughTheDoor) {

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <memory>
+
+#include "visibility/method.h"
+
+namespace ivis {
+
+/// The occlusion map on what options.backend asks for. With Backend::kAuto it is OpenGL's until
+/// that fails, then the CPU's for good, whose answers hold as well. Errors: kUnsupported if
+/// Backend::kGl is asked for and is not built in, or does not work. Threads: solve() is const and
+/// reentrant.
+Result<std::unique_ptr<Method>> make_occlusion_map(const Scene& scene, const OccluderSet& occluders,
+                                                   const MethodOptions& options);
+
+}  // namespace ivis

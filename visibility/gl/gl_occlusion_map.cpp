@@ -1,0 +1,422 @@
+#include "visibility/gl/gl_occlusion_map.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include <epoxy/gl.h>
+
+#include "core/assert.h"
+#include "visibility/answer.h"
+#include "visibility/gl/gl_shaders.h"
+#include "visibility/sub_boxes.h"
+
+namespace ivis {
+namespace {
+
+constexpr std::size_t kFaceFloats = 16;
+constexpr std::size_t kBoxFloats = 8;
+constexpr double kRoundingPixels = 1.0 / 64;
+
+float down(double v) {
+  const auto f = static_cast<float>(v);
+  return f > v ? std::nextafter(f, -std::numeric_limits<float>::infinity()) : f;
+}
+float up(double v) {
+  const auto f = static_cast<float>(v);
+  return f < v ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
+}
+
+struct Source {
+  GLenum stage;
+  const char* text;
+};
+
+std::string log_of(GLuint name, bool program) {
+  char text[1024] = {};
+  program ? glGetProgramInfoLog(name, sizeof text, nullptr, text)
+          : glGetShaderInfoLog(name, sizeof text, nullptr, text);
+  return text;
+}
+
+Result<GLuint> link(const std::vector<Source>& sources, const char* what) {
+  const GLuint program = glCreateProgram();
+  for (const Source& source : sources) {
+    const GLuint shader = glCreateShader(source.stage);
+    const char* parts[] = {kCommonShader, source.text};
+    glShaderSource(shader, 2, parts, nullptr);
+    glCompileShader(shader);
+    GLint good = GL_FALSE;
+    glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
+    if (good != GL_TRUE)
+      return unsupported(std::string("OpenGL: the ") + what +
+                         " shader is refused: " + log_of(shader, false));
+    glAttachShader(program, shader);
+    glDeleteShader(shader);
+  }
+  glLinkProgram(program);
+  GLint good = GL_FALSE;
+  glGetProgramiv(program, GL_LINK_STATUS, &good);
+  if (good != GL_TRUE)
+    return unsupported(std::string("OpenGL: the ") + what +
+                       " program does not link: " + log_of(program, true));
+  return program;
+}
+
+GLint limit(GLenum name) {
+  GLint value = 0;
+  glGetIntegerv(name, &value);
+  return value;
+}
+
+/// Sides of the cube on which a part of the box lies deeper than near_m.
+std::uint32_t sides_of(const OccluderPieces::Piece& piece, const Vec3& eye, double near_m) {
+  double lo[3];
+  double hi[3];
+  double gap[3];
+  for (int a = 0; a < 3; ++a) {
+    lo[a] = static_cast<double>(piece.lo[a]) - eye[a];
+    hi[a] = static_cast<double>(piece.hi[a]) - eye[a];
+    gap[a] = std::max(lo[a], -hi[a]);
+  }
+  std::uint32_t sides = 0;
+  for (std::uint32_t side = 0; side < 6; ++side) {
+    const auto w = side >> 1U;
+    const double deepest = (side & 1U) != 0 ? -lo[w] : hi[w];
+    if (std::max({gap[(w + 1) % 3], gap[(w + 2) % 3], 0.0}) <= deepest && deepest >= near_m)
+      sides |= 1U << side;
+  }
+  return sides;
+}
+
+}  // namespace
+
+GlOcclusionMap::GlOcclusionMap(std::unique_ptr<GlContext> context, const Scene& scene,
+                               const OccluderSet& occluders, const MethodOptions& options,
+                               const OcclusionGuards& guards)
+    : scene_(scene),
+      occluders_(occluders),
+      options_(options),
+      guards_(guards),
+      origin_(scene.bounds.empty() ? Vec3{0} : scene.bounds.centre()),
+      near_m_(near_for(occluders.reach)),
+      pieces_(make_pieces(scene, occluders, origin_)),
+      solids_(occluders),
+      context_(std::move(context)) {
+  options_.map_pixels = pixels_for(options.map_pixels, occluders.reach);
+}
+
+Result<std::unique_ptr<GlOcclusionMap>> GlOcclusionMap::create(std::unique_ptr<GlContext> context,
+                                                               const Scene& scene,
+                                                               const OccluderSet& occluders,
+                                                               const MethodOptions& options,
+                                                               const OcclusionGuards& guards) {
+  std::unique_ptr<GlOcclusionMap> map(
+      new GlOcclusionMap(std::move(context), scene, occluders, options, guards));
+  const std::uint32_t pixels = map->options_.map_pixels;
+  IVIS_ASSERT(pixels % 16 == 0 && pixels >= 64 && pixels <= 4096,
+              "pixels a face: a multiple of 16 from 64 to 4096");
+  if (auto s = map->prepare(); !s) return s.error();
+  return map;
+}
+
+const MethodTraits& GlOcclusionMap::traits() const {
+  static const MethodTraits same = [] {
+    for (MethodTraits& t : method_list())
+      if (t.name == "occlusion-map") return t;
+    return MethodTraits{};
+  }();
+  return same;
+}
+
+Status GlOcclusionMap::prepare() {
+  std::vector<float> faces;
+  levels_.reserve(pieces_.levels.size());
+  for (const OccluderPieces::Level& level : pieces_.levels) {
+    Level out{static_cast<std::uint32_t>(faces.size() / kFaceFloats), 0};
+    for (const FaceBatch& b : pieces_.faces(level))
+      for (std::uint32_t lane = 0; lane < FaceBatch::kWidth; ++lane) {
+        if (b.nx[lane] == 0 && b.ny[lane] == 0 && b.nz[lane] == 0) continue;
+        const float fourth[4] = {b.nx[lane], b.ny[lane], b.nz[lane], 0};
+        for (std::size_t c = 0; c < 4; ++c)
+          faces.insert(faces.end(), {b.x[c][lane], b.y[c][lane], b.z[c][lane], fourth[c]});
+        ++out.faces;
+      }
+    levels_.push_back(out);
+  }
+  pieces_.batches = {};  // the context has them
+  std::vector<float> boxes;
+  const SubBoxes sub_boxes(scene_, origin_);
+  for (ObjectId id = 0; id < scene_.objects.size(); ++id) {
+    const Object& o = scene_.objects[id];
+    if (o.always_visible) {
+      always_visible_.push_back(id);
+      continue;
+    }
+    const auto add = [&](const Vec3& lo, const Vec3& hi) {
+      ids_.push_back(id);
+      boxes.insert(boxes.end(),
+                   {down(lo.x), down(lo.y), down(lo.z), 0, up(hi.x), up(hi.y), up(hi.z), 0});
+    };
+    // Of an object with smaller boxes these alone: one of them shows where the object does.
+    if (const std::uint32_t node = sub_boxes.node_of(id); node != SubBoxes::kNone) {
+      const BoxTree::Node& parts = sub_boxes.tree().nodes[node];
+      for (std::uint32_t c = 0; c < parts.count; ++c)
+        add({parts.lo_x[c], parts.lo_y[c], parts.lo_z[c]},
+            {parts.hi_x[c], parts.hi_y[c], parts.hi_z[c]});
+    } else {
+      add(o.bounds.lo - origin_, o.bounds.hi - origin_);
+    }
+  }
+
+  const auto current = context_->make_current();
+  if (!current) return current.error();
+  // No more than what the standard promises, whatever the driver says.
+  const int bits = std::clamp(limit(GL_SUBPIXEL_BITS), 0, 4);
+  snap_ = static_cast<float>(std::exp2(-bits) + kRoundingPixels);
+  if (auto s = make_programs(); !s) return s;
+  if (auto s = make_map(); !s) return s;
+  if (auto s = upload(faces, boxes); !s) return s;
+  return context_->check();
+}
+
+Status GlOcclusionMap::make_programs() {
+  if (limit(GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS) < 2)
+    return unsupported("OpenGL: vertex shaders have no storage buffers (" + context_->renderer() +
+                       ")");
+  const auto draw =
+      link({{GL_VERTEX_SHADER, kDrawVertexShader}, {GL_FRAGMENT_SHADER, kDrawFragmentShader}},
+           "drawing");
+  if (!draw) return draw.error();
+  const auto pyramid = link({{GL_COMPUTE_SHADER, kPyramidShader}}, "pyramid's");
+  if (!pyramid) return pyramid.error();
+  const auto test = link({{GL_COMPUTE_SHADER, kTestShader}}, "test's");
+  if (!test) return test.error();
+  draw_program_ = *draw;
+  pyramid_program_ = *pyramid;
+  test_program_ = *test;
+
+  const auto pixels = static_cast<float>(options_.map_pixels);
+  glProgramUniform1f(draw_program_, 3, pixels);
+  glProgramUniform1f(draw_program_, 4, near_m_);
+  glProgramUniform1f(draw_program_, 5, snap_);
+  glProgramUniform1f(draw_program_, 6, kDepthGuard);
+  glProgramUniform1f(draw_program_, 7, kEdgeOn);
+  glProgramUniform1f(draw_program_, 8, pixels / 32768);
+  glProgramUniform1ui(test_program_, 1, static_cast<GLuint>(ids_.size()));
+  glProgramUniform1f(test_program_, 2, pixels);
+  glProgramUniform1f(test_program_, 3, near_m_);
+  glProgramUniform1f(test_program_, 4, kPixelGuard);
+  glProgramUniform1f(test_program_, 5, kRelative);
+  return ok();
+}
+
+Status GlOcclusionMap::make_map() {
+  const auto n = static_cast<GLsizei>(options_.map_pixels);
+  glCreateTextures(GL_TEXTURE_2D_ARRAY, 1, &depth_);
+  glTextureStorage3D(depth_, 1, GL_DEPTH_COMPONENT32F, n, n, 6);
+  glTextureParameteri(depth_, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glTextureParameteri(depth_, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  glTextureParameteri(depth_, GL_TEXTURE_COMPARE_MODE, GL_NONE);
+  glCreateFramebuffers(6, targets_);
+  for (GLint side = 0; side < 6; ++side) {
+    glNamedFramebufferTextureLayer(targets_[side], GL_DEPTH_ATTACHMENT, depth_, 0, side);
+    glNamedFramebufferDrawBuffer(targets_[side], GL_NONE);
+    glNamedFramebufferReadBuffer(targets_[side], GL_NONE);
+    if (glCheckNamedFramebufferStatus(targets_[side], GL_DRAW_FRAMEBUFFER) !=
+        GL_FRAMEBUFFER_COMPLETE)
+      return unsupported("OpenGL: cannot draw into a depth map of " + std::to_string(n) +
+                         " pixels a side (" + context_->renderer() + ")");
+  }
+  std::int32_t values = 0;
+  for (std::int32_t width = n; width > 4;) {
+    width = (width + 3) / 4;
+    begins_.push_back(values);
+    values += 6 * width * width;
+  }
+  IVIS_ASSERT(!begins_.empty() && begins_.size() <= 8, "levels of the pyramid");
+  glProgramUniform1i(test_program_, 6, static_cast<GLint>(begins_.size()));
+  glProgramUniform1iv(test_program_, 7, static_cast<GLsizei>(begins_.size()), begins_.data());
+  glCreateBuffers(1, &pyramid_);
+  glNamedBufferStorage(pyramid_, static_cast<GLsizeiptr>(values) * 4, nullptr, 0);
+  glCreateVertexArrays(1, &empty_array_);
+  return ok();
+}
+
+Status GlOcclusionMap::upload(const std::vector<float>& faces, const std::vector<float>& boxes) {
+  const auto most = static_cast<std::size_t>(limit(GL_MAX_SHADER_STORAGE_BLOCK_SIZE));
+  for (const auto& [what, values] : {std::pair{"occluders", &faces}, std::pair{"objects", &boxes}})
+    if (values->size() * sizeof(float) > most)
+      return unsupported("OpenGL: the " + std::string(what) + " take " +
+                         std::to_string(values->size() * sizeof(float)) + " bytes, at most " +
+                         std::to_string(most) + " fit (" + context_->renderer() + ")");
+  const auto fill = [](GLuint& buffer, const std::vector<float>& values) {
+    const float none = 0;
+    glCreateBuffers(1, &buffer);
+    glNamedBufferStorage(buffer,
+                         static_cast<GLsizeiptr>(std::max<std::size_t>(values.size(), 1) * 4),
+                         values.empty() ? &none : values.data(), 0);
+  };
+  fill(faces_, faces);
+  fill(boxes_, boxes);
+  bits_.resize(std::max<std::size_t>((ids_.size() + 63) / 64 * 2, 2));
+  glCreateBuffers(1, &visible_);
+  glNamedBufferStorage(visible_, static_cast<GLsizeiptr>(bits_.size() * 4), nullptr, 0);
+  glCreateBuffers(1, &refs_);
+  return ok();
+}
+
+Result<Pvs> GlOcclusionMap::solve(const ViewCell& cell) const {
+  Stats stats;
+  return solve(cell, stats);
+}
+
+Result<Pvs> GlOcclusionMap::solve(const ViewCell& cell, Stats& stats) const {
+  if (auto s = check_cell(cell, occluders_); !s) return s.error();
+  Pvs pvs = empty_answer(scene_, cell);
+  if (auto why = why_everything(cell.eye, origin_, solids_, occluders_.slack_m); !why.empty()) {
+    list_everything(scene_, std::move(why), pvs);
+    return pvs;
+  }
+  const MapCell c = make_map_cell(cell, origin_, occluders_);
+  const std::lock_guard lock(mutex_);
+  const auto current = context_->make_current();
+  if (!current) return current.error();
+  choose(c, stats);
+  found_.clear();
+  if (!ids_.empty()) {
+    run(c);
+    // A context that was lost may have read back anything: asked before the answer is believed.
+    if (auto s = context_->check(); !s) return s.error();
+    for (std::size_t k = 0; k < ids_.size(); ++k)
+      if ((bits_[k / 32] >> (k % 32) & 1U) != 0) found_.push_back(ids_[k]);
+  }
+  list_ascending(scene_.objects.size(), found_, always_visible_, scratch_, pvs);
+  return pvs;
+}
+
+/// References to the faces to draw, a list a side.
+void GlOcclusionMap::choose(const MapCell& cell, Stats& stats) const {
+  const auto pixels = static_cast<double>(options_.map_pixels);
+  const SampleMargin margin{1.01 * std::numbers::sqrt2 * (1 + 2 * static_cast<double>(snap_)),
+                            pixels};
+  for (auto& refs : side_refs_)
+    refs.clear();
+  const auto add = [&](const OccluderPieces::Piece& piece) {
+    const std::uint32_t touched = sides_of(piece, cell.eye, static_cast<double>(near_m_));
+    if (touched == 0) return;
+    // Smaller than half a pixel: hides next to nothing.
+    const Vec3 size = Vec3(piece.hi) - Vec3(piece.lo);
+    Vec3 gap{0};
+    for (int i = 0; i < 3; ++i)
+      gap[i] = std::max({static_cast<double>(piece.lo[i]) - cell.eye[i],
+                         cell.eye[i] - static_cast<double>(piece.hi[i]), 0.0});
+    if (glm::dot(size, size) * pixels * pixels < glm::dot(gap, gap)) return;
+    const PieceChoice chosen = choose_level(pieces_, piece, cell, margin, touched, guards_);
+    if (chosen.sides == 0) return;
+    ++stats.pieces_drawn;
+    const Level& level = levels_[chosen.level];
+    const std::uint32_t sheet = piece.kind == OccluderPieces::Kind::kSheet ? 1 : 0;
+    for (std::uint32_t left = chosen.sides; left != 0; left &= left - 1) {
+      auto& refs = side_refs_[std::countr_zero(left)];
+      for (std::uint32_t f = level.first; f < level.first + level.faces; ++f)
+        refs.push_back(2 * f + sheet);
+    }
+  };
+  if (options_.max_occluders > 0 && options_.max_occluders < pieces_.pieces.size()) {
+    for (const std::uint32_t p : largest_pieces(pieces_, cell.eye, options_.max_occluders))
+      add(pieces_.pieces[p]);
+  } else {
+    for (const OccluderPieces::Piece& piece : pieces_.pieces)
+      add(piece);
+  }
+  for (const auto& refs : side_refs_)
+    stats.faces_drawn += static_cast<std::uint32_t>(refs.size());
+}
+
+/// Draws, builds the pyramid, tests, and reads `bits_` back.
+void GlOcclusionMap::run(const MapCell& cell) const {
+  const auto n = static_cast<GLsizei>(options_.map_pixels);
+  const GLfloat nothing = 0;
+  all_refs_.clear();
+  for (const auto& refs : side_refs_)
+    all_refs_.insert(all_refs_.end(), refs.begin(), refs.end());
+  if (!all_refs_.empty())
+    glNamedBufferData(refs_, static_cast<GLsizeiptr>(all_refs_.size() * 4), all_refs_.data(),
+                      GL_STREAM_DRAW);
+
+  glViewport(0, 0, n, n);
+  glDepthMask(GL_TRUE);
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_GREATER);
+  glBindVertexArray(empty_array_);
+  glUseProgram(draw_program_);
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, faces_);
+  if (!all_refs_.empty()) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, refs_);
+  glUniform3f(0, cell.single[0], cell.single[1], cell.single[2]);
+  // A draw call's vertices are counted in 31 bits.
+  constexpr std::size_t kMostFaces = 0x7fffffff / 6;
+  std::size_t first = 0;
+  for (std::uint32_t side = 0; side < 6; ++side) {
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, targets_[side]);
+    glClearBufferfv(GL_DEPTH, 0, &nothing);
+    glUniform1ui(2, side);
+    for (std::size_t left = side_refs_[side].size(); left > 0;) {
+      const std::size_t now = std::min(left, kMostFaces);
+      glUniform1ui(1, static_cast<GLuint>(first));
+      glDrawArrays(GL_TRIANGLES, 0, static_cast<GLsizei>(6 * now));
+      first += now;
+      left -= now;
+    }
+  }
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
+
+  glBindTextureUnit(0, depth_);
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, pyramid_);
+  glUseProgram(pyramid_program_);
+  GLint width = n;
+  GLint below = -1;
+  for (const std::int32_t here : begins_) {
+    const GLint half = (width + 3) / 4;
+    glUniform1i(0, below);
+    glUniform1i(1, width);
+    glUniform1i(2, here);
+    glUniform1i(3, half);
+    glDispatchCompute(static_cast<GLuint>(half + 7) / 8, static_cast<GLuint>(half + 7) / 8, 6);
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    below = here;
+    width = half;
+  }
+
+  glUseProgram(test_program_);
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 3, boxes_);
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 4, visible_);
+  glUniform3f(0, cell.single[0], cell.single[1], cell.single[2]);
+  const auto groups = static_cast<GLuint>((ids_.size() + 63) / 64);
+  const GLuint columns = std::min(groups, 32768U);
+  // What is not written shows.
+  const GLuint shown = 0xffffffffU;
+  glClearNamedBufferData(visible_, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, &shown);
+  std::fill(bits_.begin(), bits_.end(), shown);
+  glDispatchCompute(columns, (groups + columns - 1) / columns, 1);
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  glGetNamedBufferSubData(visible_, 0, static_cast<GLsizeiptr>(bits_.size() * 4), bits_.data());
+}
+
+Result<std::unique_ptr<Method>> make_gl_occlusion_map(const Scene& scene,
+                                                      const OccluderSet& occluders,
+                                                      const MethodOptions& options) {
+  GlContext::Options wanted;
+  wanted.hardware_only = options.backend == Backend::kAuto;
+  auto context = GlContext::create(wanted);
+  if (!context) return context.error();
+  auto map = GlOcclusionMap::create(std::move(*context), scene, occluders, options);
+  if (!map) return map.error();
+  return std::unique_ptr<Method>(std::move(*map));
+}
+
+}  // namespace ivis
