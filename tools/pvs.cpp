@@ -41,8 +41,9 @@ Outcome one_eye(const Args& args, const Scene& scene, const Method& method, cons
   const MethodTraits& traits = method.traits();
   const char* guarantee = to_string(traits.guarantee);
   if (args.json) {
-    Json j{{"method", traits.name}, {"backend", to_string(method.backend())}, {"guarantee", guarantee}, {"objects", t->pvs.objects}, {"count", t->pvs.objects.size()},
-           {"total", scene.objects.size()}, {"compute_ms", t->compute_ms}, {"wall_ms", t->wall_ms}};
+    Json j{{"method", traits.name}, {"guarantee", guarantee}, {"objects", t->pvs.objects}, {"count", t->pvs.objects.size()},
+           {"total", scene.objects.size()}, {"compute_ms", t->compute_ms}, {"wall_ms", t->wall_ms},
+           {"backend", to_string(method.backend())}};
     if (!t->pvs.everything_because.empty()) j["everything_because"] = t->pvs.everything_because;
     print(j);
     return kOk;
@@ -88,8 +89,9 @@ Outcome along_path(const Args& args, const std::vector<Pose>& path, const Scene&
     context.report("poses", row + 1, path.size());
   }
   if (args.json) {
-    print({{"method", method.traits().name}, {"backend", to_string(method.backend())}, {"poses", poses}, {"count_median", median(counts)}, {"compute_ms_median", median(compute)},
-           {"compute_ms_p99", percentile(compute, 0.99)}, {"wall_ms_median", median(wall)}});
+    print({{"poses", poses}, {"count_median", median(counts)}, {"compute_ms_median", median(compute)},
+           {"compute_ms_p99", percentile(compute, 0.99)}, {"wall_ms_median", median(wall)},
+           {"backend", to_string(method.backend())}});
     return kOk;
   }
   std::cout << path.size() << " poses: median " << median(counts) << " of " << scene.objects.size()

@@ -29,7 +29,7 @@ TEST(ToolPvs, PrintsTheFixedKeys) {
   ASSERT_EQ(ran.code, 0) << ran.errors;
   const Json j = ran.json();
   EXPECT_EQ(keys(j),
-            (Keys{"method", "guarantee", "objects", "count", "total", "compute_ms", "wall_ms"}));
+            (Keys{"method", "guarantee", "objects", "count", "total", "compute_ms", "wall_ms", "backend"}));
   EXPECT_EQ(j["guarantee"], "conservative");
   EXPECT_EQ(j["total"], SmallTown::kObjects);
   EXPECT_EQ(j["count"], j["objects"].size());
@@ -47,6 +47,31 @@ TEST(ToolPvs, EachMethodAndMapAnswers) {
                                                {"--max-occluders", "3"}}) {
     EXPECT_FALSE(pvs_ids(town, SmallTown::kEye, more).empty());
   }
+}
+
+TEST(ToolPvs, TheBackendThatIsAskedForAnswersOrSaysWhyNot) {
+  setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
+  const SmallTown town;
+  const auto run = [&](const std::string& method, const std::string& backend) {
+    return ivis({"pvs", town.scene, "--eye", SmallTown::kEye, "--reach", kReach, "--json",
+                 "--method", method, "--backend", backend});
+  };
+  const Ran cpu = run("occlusion-map", "cpu");
+  ASSERT_EQ(cpu.code, 0) << cpu.errors;
+  EXPECT_EQ(cpu.json()["backend"], "cpu");
+  const Ran automatic = run("occlusion-map", "auto");
+  ASSERT_EQ(automatic.code, 0) << automatic.errors;
+  const Ran gl = run("occlusion-map", "gl");
+  if (gl.code == 0) {
+    EXPECT_EQ(gl.json()["backend"], "gl");
+    EXPECT_LT(gl.json()["count"], 2 * cpu.json()["count"].get<int>());
+    EXPECT_GT(2 * gl.json()["count"].get<int>(), cpu.json()["count"]);
+  } else {
+    EXPECT_EQ(gl.code, 3);
+    EXPECT_NE(gl.errors.find("OpenGL"), std::string::npos) << gl.errors;
+  }
+  EXPECT_EQ(run("cull-map", "gl").code, 2);
+  EXPECT_EQ(run("occlusion-map", "direct3d").code, 2);
 }
 
 TEST(ToolPvs, ThreadsChangeNothing) {
@@ -82,7 +107,7 @@ TEST(ToolPvs, APathDumpsWhatEachEyeGives) {
   ASSERT_EQ(ran.code, 0) << ran.errors;
   const Json j = ran.json();
   EXPECT_EQ(keys(j), (Keys{"poses", "count_median", "compute_ms_median", "compute_ms_p99",
-                           "wall_ms_median"}));
+                           "wall_ms_median", "backend"}));
   ASSERT_EQ(j["poses"].size(), SmallTown::kPoses);
   std::vector<double> counts;
   for (std::size_t row = 0; row < SmallTown::kPoses; ++row) {
