@@ -141,17 +141,32 @@ ivis_status ivis_object_node(const ivis_client* client, uint32_t id, uint32_t* n
   return IVIS_OK;
 }
 
+ivis_status ivis_object_cluster(const ivis_client* client, uint32_t id, uint32_t* cluster) {
+  if (client == nullptr || cluster == nullptr) return IVIS_ERROR_ARGUMENT;
+  const Catalogue* c = client->source().catalogue();
+  if (c == nullptr) return IVIS_ERROR_CONNECTION;
+  if (id >= c->objects()) return IVIS_ERROR_ARGUMENT;
+  *cluster = c->cluster_of(id);
+  return IVIS_OK;
+}
+
 ivis_status ivis_object_id(const ivis_client* client, uint32_t node, uint32_t instance,
                            uint32_t* id) {
-  if (client == nullptr || id == nullptr) return IVIS_ERROR_ARGUMENT;
+  return id != nullptr ? ivis_object_ids(client, node, instance, id, nullptr) : IVIS_ERROR_ARGUMENT;
+}
+
+ivis_status ivis_object_ids(const ivis_client* client, uint32_t node, uint32_t instance,
+                            uint32_t* first_id, uint32_t* count) {
+  if (client == nullptr) return IVIS_ERROR_ARGUMENT;
   const Catalogue* c = client->source().catalogue();
   if (c == nullptr) return IVIS_ERROR_CONNECTION;
   const auto [first, last] = std::equal_range(c->node.begin(), c->node.end(), node);
   const auto from = c->instance.begin() + (first - c->node.begin());
   const auto to = c->instance.begin() + (last - c->node.begin());
-  const auto found = std::lower_bound(from, to, instance);
-  if (found == to || *found != instance) return IVIS_ERROR_ARGUMENT;
-  *id = static_cast<std::uint32_t>(found - c->instance.begin());
+  const auto [low, high] = std::equal_range(from, to, instance);
+  if (low == high) return IVIS_ERROR_ARGUMENT;
+  if (first_id != nullptr) *first_id = static_cast<std::uint32_t>(low - c->instance.begin());
+  if (count != nullptr) *count = static_cast<std::uint32_t>(high - low);
   return IVIS_OK;
 }
 

@@ -54,9 +54,21 @@ Status check_catalogue(const Catalogue& c) {
   if (c.node.size() != c.instance.size())
     return input_error("object table: " + std::to_string(c.node.size()) + " nodes, " +
                        std::to_string(c.instance.size()) + " instances");
-  for (std::size_t i = 1; i < c.node.size(); ++i)
-    if (std::pair(c.node[i - 1], c.instance[i - 1]) >= std::pair(c.node[i], c.instance[i]))
+  if (!c.cluster.empty() && c.cluster.size() != c.node.size())
+    return input_error("object table: " + std::to_string(c.node.size()) + " nodes, " +
+                       std::to_string(c.cluster.size()) + " clusters");
+  for (std::uint32_t i = 0; i < c.objects(); ++i) {
+    bool sound = c.cluster_of(i) == 0;
+    if (i > 0) {
+      const std::pair before(c.node[i - 1], c.instance[i - 1]);
+      const std::pair here(c.node[i], c.instance[i]);
+      sound = before < here ? sound
+                            : before == here && c.cluster_of(i) != 0 &&
+                                  c.cluster_of(i) - 1 == c.cluster_of(i - 1);
+    }
+    if (!sound)
       return input_error("object table: object " + std::to_string(i) + " is out of order");
+  }
   return ok();
 }
 

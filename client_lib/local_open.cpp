@@ -19,6 +19,12 @@ Result<std::unique_ptr<client::PvsSource>> open(const ivis_local_options& option
   if (options.reach != nullptr) wanted.reach = options.reach;
   if (options.method != nullptr) wanted.method = options.method;
   wanted.threads = options.threads;
+  if (options.granularity != nullptr) {
+    const auto granularity = parse_granularity(options.granularity);
+    if (!granularity)
+      return Error{granularity.error().code, "granularity: " + granularity.error().message};
+    wanted.granularity = *granularity;
+  }
   auto loaded = server::load_world(wanted);
   if (!loaded) return loaded.error();
   const std::shared_ptr<server::World> world = std::move(*loaded);

@@ -138,6 +138,7 @@ Catalogue catalogue_of(const Scene& scene, const Reach& reach, const Method& met
   for (const Object& o : scene.objects) {
     c.node.push_back(o.node);
     c.instance.push_back(o.instance);
+    if (!scene.wholes.empty()) c.cluster.push_back(o.cluster);
   }
   return c;
 }

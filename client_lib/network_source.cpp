@@ -145,11 +145,14 @@ struct NetworkSource::Impl {
       return fail(mismatch("the server speaks version " + std::to_string(w.version) +
                            ", the client " + std::to_string(wire::kProtocolVersion)));
     if (scene_hash != 0 && w.scene_hash != scene_hash)
-      return fail(mismatch("the client's scene has the hash " + to_hex(scene_hash) +
-                           ", the server's " + to_hex(w.scene_hash)));
+      return fail(mismatch(
+          "the client's scene has the hash " + to_hex(scene_hash) + ", the server's " +
+          to_hex(w.scene_hash) +
+          (w.table.cluster.empty() ? "" : ", which is split into clusters (granularity cluster)")));
     auto reach_served = Reach::parse(w.reach);
     if (w.session == 0 || !reach_served || w.table.id.size() != w.objects ||
-        w.table.node.size() != w.objects || w.table.instance.size() != w.objects) {
+        w.table.node.size() != w.objects || w.table.instance.size() != w.objects ||
+        (!w.table.cluster.empty() && w.table.cluster.size() != w.objects)) {
       ++counted.bad_messages;
       last_trouble = "a Welcome that contradicts itself";
       return;
@@ -160,16 +163,19 @@ struct NetworkSource::Impl {
     told.method = w.method;
     told.node.resize(w.objects);
     told.instance.resize(w.objects);
+    told.cluster.resize(w.table.cluster.size());
     for (Rank r = 0; r < w.objects; ++r) {
       told.node[w.table.id[r]] = w.table.node[r];
       told.instance[w.table.id[r]] = w.table.instance[r];
+      if (!told.cluster.empty()) told.cluster[w.table.id[r]] = w.table.cluster[r];
     }
     if (auto sound = check_catalogue(told); !sound) {
       ++counted.bad_messages;
       last_trouble = sound.error().message;
       return;
     }
-    if (catalogue && (told.node != catalogue->node || told.instance != catalogue->instance))
+    if (catalogue && (told.node != catalogue->node || told.instance != catalogue->instance ||
+                      told.cluster != catalogue->cluster))
       return fail(mismatch("the server's objects have changed under the scene hash " +
                            to_hex(w.scene_hash)));
     if (catalogue && was_lost) ++counted.reconnects;

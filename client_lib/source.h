@@ -25,11 +25,14 @@ struct Catalogue {
   std::string reach;
   std::string method;
   std::vector<std::uint32_t> node;      ///< by id
-  std::vector<std::uint32_t> instance;  ///< by id; (node, instance) ascends
+  std::vector<std::uint32_t> instance;  ///< by id
+  std::vector<std::uint32_t> cluster;   ///< by id; empty: all 0
+  std::uint32_t cluster_of(std::uint32_t id) const { return cluster.empty() ? 0 : cluster[id]; }
   std::uint32_t objects() const { return static_cast<std::uint32_t>(node.size()); }
 };
 
-/// Fails unless (node, instance) ascends strictly, which finding an id by them relies on.
+/// Fails unless (node, instance, cluster) ascends strictly and the clusters of an instance count
+/// from 0, which finding an id by them relies on.
 Status check_catalogue(const Catalogue& catalogue);
 
 /// The PVS of one pose.

@@ -480,7 +480,8 @@ Status check_occluders(const OccluderSet& set, SceneHash scene_hash, const Reach
                        const std::string& name) {
   if (set.scene_hash != scene_hash)
     return mismatch(name + ": made for the scene with hash " + to_hex(set.scene_hash) +
-                    ", this scene's is " + to_hex(scene_hash));
+                    ", this scene's is " + to_hex(scene_hash) +
+                    " (another file, or the same with another --granularity)");
   if (!serves(set, reach))
     return mismatch(name + ": shrunk for the reach " + set.reach.to_string() +
                     ", which does not contain " + reach.to_string());

@@ -73,7 +73,7 @@ Polygon rectangle_polygon(const Aabb& b) {
 /// none.
 std::size_t buried(const Scene& scene, const Ground& ground, std::size_t most) {
   std::size_t count = 0;
-  for (const Object& o : scene.objects) {
+  for (const Object& o : sources(scene)) {
     if (o.always_visible) continue;
     Aabb box = o.bounds;
     box.lo = glm::max(box.lo, ground.rectangle().lo);
@@ -187,7 +187,7 @@ class Outline {
 }  // namespace
 
 Ground::Ground(std::vector<Vec3> corners, std::vector<Corners> triangles,
-               std::vector<ObjectId> objects)
+               std::vector<std::uint32_t> objects)
     : objects_(std::move(objects)), corners_(std::move(corners)), triangles_(std::move(triangles)) {
   std::vector<Box2> boxes;
   boxes.reserve(triangles_.size());
@@ -261,7 +261,7 @@ double Ground::height_at(double x, double z) const {
 
 std::optional<Ground> find_ground(const Scene& scene, const Context& context) {
   Aabb all;
-  for (const Object& o : scene.objects)
+  for (const Object& o : sources(scene))
     if (!o.always_visible) all.add(o.bounds);
   const Soup soup = ground_soup(scene, false);
   std::vector<Piece> pieces = split(soup);
@@ -270,7 +270,7 @@ std::optional<Ground> find_ground(const Scene& scene, const Context& context) {
     return std::nullopt;
   }
   const auto name = [&](const Piece& p) {
-    const Object& o = scene.objects[soup.objects[p.triangles.front()]];
+    const Object& o = sources(scene)[soup.objects[p.triangles.front()]];
     return "node " + std::to_string(o.node) + " '" + scene.name_of(o) + "'";
   };
   std::sort(pieces.begin(), pieces.end(),
@@ -294,7 +294,7 @@ std::optional<Ground> find_ground(const Scene& scene, const Context& context) {
     }
     std::vector<Vec3> corners;
     std::vector<Corners> triangles;
-    std::vector<ObjectId> objects;
+    std::vector<std::uint32_t> objects;
     std::unordered_map<std::uint32_t, std::uint32_t> renumbered;
     for (const std::uint32_t t : piece.triangles) {
       Corners& triangle = triangles.emplace_back();
@@ -308,7 +308,7 @@ std::optional<Ground> find_ground(const Scene& scene, const Context& context) {
       if (objects.empty() || objects.back() != soup.objects[t]) objects.push_back(soup.objects[t]);
     }
     Ground ground(std::move(corners), std::move(triangles), std::move(objects));
-    const std::size_t most = scene.objects.size() / kBuriedIn;
+    const std::size_t most = sources(scene).size() / kBuriedIn;
     if (buried(scene, ground, most) > most) {
       context.say("no ground at " + name(piece) +
                   ": objects lie wholly below it, it may be a ceiling");

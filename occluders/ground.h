@@ -22,8 +22,8 @@ class Ground {
  public:
   /// lo.x..hi.x, lo.z..hi.z; y spans the heights. This is OccluderSet::ground.
   const Aabb& rectangle() const { return rectangle_; }
-  /// The objects it is made of, ascending: they are no solids.
-  const std::vector<ObjectId>& objects() const { return objects_; }
+  /// The objects it is made of, as indices into sources(), ascending: they are no solids.
+  const std::vector<std::uint32_t>& objects() const { return objects_; }
   std::size_t triangle_count() const { return triangles_.size(); }
 
   /// Does the footprint (even-odd filled) lie within the rectangle, and the ground nowhere below
@@ -40,10 +40,10 @@ class Ground {
  private:
   friend std::optional<Ground> find_ground(const Scene&, const Context&);
   Ground(std::vector<Vec3> corners, std::vector<std::array<std::uint32_t, 3>> triangles,
-         std::vector<ObjectId> objects);
+         std::vector<std::uint32_t> objects);
 
   Aabb rectangle_;
-  std::vector<ObjectId> objects_;
+  std::vector<std::uint32_t> objects_;
   std::vector<Vec3> corners_;
   std::vector<std::array<std::uint32_t, 3>> triangles_;
   RectTree tree_;  // over triangles_, by their projections

@@ -43,15 +43,15 @@ bool all_opaque(const Mesh& mesh) {
 class SoupBuilder {
  public:
   SoupBuilder(const Scene& scene, bool occluders_only) : scene_(scene) {
-    for (std::size_t i = 0; i < scene.objects.size(); ++i)
-      if (!occluders_only || scene.objects[i].tag != OccluderTag::kNever)
-        add(static_cast<ObjectId>(i));
+    for (std::size_t i = 0; i < sources(scene).size(); ++i)
+      if (!occluders_only || sources(scene)[i].tag != OccluderTag::kNever)
+        add(static_cast<std::uint32_t>(i));
   }
   Soup take() { return std::move(soup_); }
 
  private:
-  void add(ObjectId id) {
-    const Object& object = scene_.objects[id];
+  void add(std::uint32_t index) {
+    const Object& object = sources(scene_)[index];
     const Mesh& mesh = scene_.mesh_of(object);
     if (object.always_visible || mesh.triangles() == 0 || !all_opaque(mesh)) return;
     found_.clear();
@@ -77,7 +77,7 @@ class SoupBuilder {
     for (const Found& f : found_) {
       soup_.triangles.push_back({corner(f.triangle.a), corner(f.triangle.b), corner(f.triangle.c)});
       soup_.twice.push_back(f.twice);
-      soup_.objects.push_back(id);
+      soup_.objects.push_back(index);
     }
   }
 

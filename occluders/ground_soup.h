@@ -22,8 +22,8 @@ inline double twice_area(const Vec3& a, const Vec3& b, const Vec3& c) {
 struct Soup {
   std::vector<Vec3> corners;
   std::vector<Corners> triangles;
-  std::vector<double> twice;      // signed projected area of each
-  std::vector<ObjectId> objects;  // of each
+  std::vector<double> twice;           // signed projected area of each
+  std::vector<std::uint32_t> objects;  // of each, as an index into sources()
 };
 
 /// One side of one triangle; sorting brings the sides that share an edge together.

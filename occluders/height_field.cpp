@@ -190,7 +190,7 @@ class Raster {
 /// Objects that lie wholly under the ground: under a real one next to none.
 std::size_t buried(const Scene& scene, const HeightField& field) {
   std::size_t count = 0;
-  for (const Object& o : scene.objects) {
+  for (const Object& o : sources(scene)) {
     if (o.always_visible) continue;
     const Vec2 lo = (ground(o.bounds.lo) - field.origin) / field.step;
     const Vec2 hi = (ground(o.bounds.hi) - field.origin) / field.step;
@@ -228,7 +228,7 @@ std::optional<Terrain> find_terrain(const Scene& scene, double cell_m, const Con
   const Soup soup = ground_soup(scene, true);
   std::vector<Piece> pieces = split(soup);
   Aabb all;
-  for (const Object& o : scene.objects)
+  for (const Object& o : sources(scene))
     if (!o.always_visible) all.add(o.bounds);
   std::erase_if(pieces, [&](const Piece& p) {
     return 2 * p.box.size().x < all.size().x || 2 * p.box.size().z < all.size().z ||
@@ -239,7 +239,7 @@ std::optional<Terrain> find_terrain(const Scene& scene, double cell_m, const Con
   for (const Piece& piece : pieces) {
     if (context.stopped()) return std::nullopt;
     const auto name = [&] {
-      const Object& o = scene.objects[soup.objects[piece.triangles.front()]];
+      const Object& o = sources(scene)[soup.objects[piece.triangles.front()]];
       return "node " + std::to_string(o.node) + " '" + scene.name_of(o) + "'";
     };
     if (piece.box.size().y < kLeastReliefM) {
@@ -247,7 +247,7 @@ std::optional<Terrain> find_terrain(const Scene& scene, double cell_m, const Con
       continue;
     }
     Terrain terrain{Raster(soup, piece, cell_m).field(), {}};
-    if (buried(scene, terrain.field) > scene.objects.size() / kBuriedIn) {
+    if (buried(scene, terrain.field) > sources(scene).size() / kBuriedIn) {
       context.say("no terrain at " + name() + ": objects lie wholly below it, it may be a ceiling");
       continue;
     }
@@ -309,8 +309,8 @@ HeightField erode(const HeightField& field, const Reach& grown, double drop_m) {
   return out;
 }
 
-std::vector<ObjectId> add_height_field(const Scene& scene, OccluderSet& set,
-                                       const Context& context) {
+std::vector<std::uint32_t> add_height_field(const Scene& scene, OccluderSet& set,
+                                            const Context& context) {
   const Reach grown = padded(set.reach, set.slack_m);
   const Vec3 e = grown.half_extents();
   auto terrain = find_terrain(scene, std::min(e.x, e.z), context);

@@ -17,7 +17,8 @@ struct Terrain {
   /// Of each cell: the least height over it, where exactly one triangle lies over every point of it
   /// and no open edge, fold or crack touches it; HeightField::kNone elsewhere.
   HeightField field;
-  std::vector<ObjectId> objects;  ///< that it is made of, ascending: they are no solids
+  std::vector<std::uint32_t>
+      objects;  ///< that it is made of, as indices into sources(), ascending: no solids
 };
 
 /// Finds the largest edge-connected piece of opaque triangles without steep ones that spans half of
@@ -44,7 +45,7 @@ HeightField erode(const HeightField& field, const Reach& grown, double drop_m);
 
 /// Finds the scene's terrain and puts its shrunk height field into `set`, whose reach and slack say
 /// by how much. Returns the objects it is made of; empty without terrain.
-std::vector<ObjectId> add_height_field(const Scene& scene, OccluderSet& set,
-                                       const Context& context = {});
+std::vector<std::uint32_t> add_height_field(const Scene& scene, OccluderSet& set,
+                                            const Context& context = {});
 
 }  // namespace ivis

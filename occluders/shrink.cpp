@@ -43,7 +43,7 @@ double slack_for(const Aabb& bounds) {
 /// Lowest y of all triangles, from the same products as the prisms' bases: those compare equal.
 double lowest_y(const Scene& scene) {
   double floor = std::numeric_limits<double>::infinity();
-  for (const auto* list : {&scene.objects, &scene.hidden_solids})
+  for (const auto* list : {&sources(scene), &scene.hidden_solids})
     for (const Object& o : *list) {
       if (o.bounds.lo.y > floor) continue;
       if (scene.mesh_of(o).triangles() == 0) floor = std::min(floor, o.bounds.lo.y);
@@ -142,21 +142,21 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
                                               : options.margins_m;
 
   std::vector<const Object*> objects;
-  for (const Object& o : scene.objects)
+  for (const Object& o : sources(scene))
     objects.push_back(&o);
   for (const Object& o : scene.hidden_solids)
     objects.push_back(&o);
   report.occluders_in = objects.size();
 
   const std::optional<Ground> terrain = find_ground(scene, context);
-  std::vector<bool> is_ground(objects.size(), false);
+  std::vector<bool> is_ground(objects.size(), false);  // by index into sources()
   if (terrain) {
     set.ground = terrain->rectangle();
-    for (const ObjectId id : terrain->objects())
-      is_ground[id] = true;
+    for (const std::uint32_t i : terrain->objects())
+      is_ground[i] = true;
   }
-  for (const ObjectId id : add_height_field(scene, set, context))
-    is_ground[id] = true;
+  for (const std::uint32_t i : add_height_field(scene, set, context))
+    is_ground[i] = true;
 
   std::vector<ObjectSolids> found(objects.size());
   {

@@ -144,7 +144,7 @@ Result<Voxelized> voxelize(const Scene& scene, double cell_m, std::size_t max_by
   const auto blocks = [](const Object& o) {
     return o.tag != OccluderTag::kNever && !o.always_visible;
   };
-  for (const Object& o : scene.objects)
+  for (const Object& o : sources(scene))
     if (blocks(o)) drawn[o.mesh] = 1;
   for (const Object& o : scene.hidden_solids)
     if (blocks(o)) hidden[o.mesh] = 1;
@@ -163,7 +163,7 @@ Result<Voxelized> voxelize(const Scene& scene, double cell_m, std::size_t max_by
   double needed = table_bytes;
   for (int pass = 0; pass < 2; ++pass) {
     const bool solid = pass == 1;
-    for (const Object& o : solid ? scene.hidden_solids : scene.objects) {
+    for (const Object& o : solid ? scene.hidden_solids : sources(scene)) {
       if (!blocks(o)) continue;
       const auto& list = solid ? of_hidden[o.mesh] : of_mesh[o.mesh];
       if (list.empty()) continue;

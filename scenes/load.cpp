@@ -124,6 +124,11 @@ Result<Scene> load_scene(const std::filesystem::path& file, const SceneOptions& 
     document->reset();  // before the bounds: the file's bytes and tables are the larger half
     scene->honour_sidedness = options.honour_sidedness;
     if (auto s = finish_scene(*scene); !s) return named(s.error());
+    if (options.granularity == Granularity::kCluster) {
+      auto split = split_into_clusters(*std::move(scene));
+      if (!split) return named(split.error());
+      return split;
+    }
     return scene;
   } catch (const std::bad_alloc&) {
     return named(input_error("asks for more memory than there is"));

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "core/context.h"
+#include "scenes/clusters.h"
 #include "scenes/scene.h"
 
 namespace ivis {
@@ -11,6 +12,8 @@ struct SceneOptions {
   /// Honour glTF's doubleSided = false; default: every opaque triangle blocks from both sides, as
   /// winding in city and CAD data is not to be trusted.
   bool honour_sidedness = false;
+  /// kCluster: large meshes are split into several objects.
+  Granularity granularity = Granularity::kObject;
 };
 
 /// Loads a .glb or .gltf file: the nodes reachable from its default scene, as in

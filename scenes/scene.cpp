@@ -184,7 +184,7 @@ Status finish_scene(Scene& scene) {
   scene.bounds = {};
   scene.triangle_count = 0;
   Bounds bounds(scene);
-  for (auto* list : {&scene.objects, &scene.hidden_solids}) {
+  for (auto* list : {&scene.objects, &scene.hidden_solids, &scene.wholes}) {
     for (Object& o : *list) {
       if (o.mesh >= scene.meshes.size())
         return input_error(describe(scene, o) + ": mesh " + std::to_string(o.mesh) +
@@ -219,7 +219,15 @@ Status finish_scene(Scene& scene) {
       hasher.add(o);
   }
   hasher.add(static_cast<std::uint8_t>(scene.honour_sidedness));
+  if (!scene.wholes.empty()) {  // else nothing: a scene that is not split keeps its hash
+    for (const Object& o : scene.objects)
+      hasher.add(o.cluster);
+    hasher.add(std::uint64_t{scene.wholes.size()});
+    for (const Object& o : scene.wholes)
+      hasher.add(o);
+  }
   scene.hash = hasher.digest();
+  scene.whole_hash = scene.hash;
   return ok();
 }
 

@@ -37,10 +37,11 @@ struct Mesh {
   std::size_t triangles() const { return indices.size() / 3; }
 };
 
-/// One instance of a mesh-bearing node.
+/// One instance of a mesh-bearing node, or one cluster of its triangles (scenes/clusters.h).
 struct Object {
   std::uint32_t node = 0;      ///< index in the glTF file
   std::uint32_t instance = 0;  ///< 0 unless EXT_mesh_gpu_instancing
+  std::uint32_t cluster = 0;   ///< 0..k-1 of an instance that was split into k; else 0
   std::uint32_t mesh = 0;      ///< index into Scene::meshes
   OccluderTag tag = OccluderTag::kAuto;
   bool always_visible = false;  ///< skinned, morphed or animated: bounds are not to be trusted, tag is kNever
@@ -55,21 +56,29 @@ struct Triangle {
 
 /// Threads: read-only after loading. Ownership: meshes are shared by instances.
 struct Scene {
-  std::vector<Object> objects;       ///< by ObjectId: ascending node index, then instance
+  std::vector<Object> objects;       ///< by ObjectId: ascending node index, then instance, then cluster
   std::vector<Object> hidden_solids; ///< nodes marked `only`: occlude, have no id
+  std::vector<Object> wholes;        ///< `objects` before they were split into clusters; empty when none was
   std::vector<Mesh> meshes;
   std::vector<std::string> node_names;  ///< by glTF node index; may be empty strings
   std::vector<std::string> extensions;  ///< used by the file, sorted
   std::vector<std::string> warnings;
-  Aabb bounds;                          ///< of objects and hidden solids
+  Aabb bounds;                          ///< of objects, hidden solids and wholes
   std::size_t triangle_count = 0;       ///< over objects, each instance counted
   bool honour_sidedness = false;        ///< triangles of single-sided materials do not block from behind
   SceneHash hash = 0;                   ///< of everything above that visibility depends on
+  SceneHash whole_hash = 0;             ///< of the same scene before it was split into clusters; `hash` when it was not
 
   std::size_t object_count() const { return objects.size(); }
   const Mesh& mesh_of(const Object& o) const { return meshes[o.mesh]; }
   const std::string& name_of(const Object& o) const { return node_names[o.node]; }
 };
+
+/// The drawn objects with their meshes whole: what solids and ground are looked for in, as a cluster is
+/// never closed. Indices into it are ObjectIds only while nothing was split.
+inline const std::vector<Object>& sources(const Scene& scene) {
+  return scene.wholes.empty() ? scene.objects : scene.wholes;
+}
 
 /// Triangle `t` of the object's mesh, in world space, corners in the order of the mesh: under a mirroring
 /// to_world (negative determinant) its front is the clockwise side (glTF 2.0 section 3.7.4).
@@ -81,7 +90,7 @@ inline Triangle world_triangle(const Scene& scene, const Object& object, std::si
   return {corner(0), corner(1), corner(2)};
 }
 
-/// Fills bounds, triangle_count and hash from the rest, and checks what the struct promises (indices in
+/// Fills bounds, triangle_count and the hashes from the rest, and checks what the struct promises (indices in
 /// range, finite numbers). For loaders and for tests that build a scene by hand.
 /// Errors: kInput naming the node and the value.
 Status finish_scene(Scene& scene);

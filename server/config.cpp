@@ -103,6 +103,13 @@ Status set_listen(Config& c, const std::string& text) {
   return ok();
 }
 
+Status set_granularity(Config& c, const std::string& text) {
+  const auto granularity = parse_granularity(text);
+  if (!granularity) return granularity.error();
+  c.granularity = *granularity;
+  return ok();
+}
+
 Status set_level(Config& c, const std::string& text) {
   const auto level = parse_log_level(text);
   if (!level) return level.error();
@@ -126,6 +133,11 @@ const std::vector<Key>& keys() {
        Kind::kPath,
        get_path(&Config::occluders),
        set_path(&Config::occluders)},
+      {{"granularity", "WHAT",
+        "object: one object a node or instance; cluster: large meshes are split into clusters"},
+       Kind::kText,
+       [](const Config& c) -> std::string { return granularity_name(c.granularity); },
+       set_granularity},
       {{"reach", "R",
         "how far an observer may get before the next answer; without: that of the occluders, or " +
             std::string(kDefaultReach)},

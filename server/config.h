@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/result.h"
+#include "scenes/clusters.h"
 #include "server/log.h"
 
 namespace ivis::server {
@@ -18,7 +19,8 @@ namespace ivis::server {
 struct Config {
   std::filesystem::path scene;
   std::filesystem::path occluders;  ///< empty: shrink at start
-  std::string reach;                ///< empty: the occluder file's, or kDefaultReach
+  Granularity granularity = Granularity::kObject;
+  std::string reach;  ///< empty: the occluder file's, or kDefaultReach
   std::string listen = "tcp://127.0.0.1:7447";
   std::string method;    ///< empty: the first of method_list()
   unsigned threads = 1;  ///< inside one solve

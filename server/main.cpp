@@ -136,6 +136,7 @@ int serve(const Config& config) {
   wanted.default_reach = kDefaultReach;
   wanted.method = config.method;
   wanted.threads = config.threads;
+  wanted.granularity = config.granularity;
   const Context context = shown_progress(log);
   auto world = load_world(wanted, context);
   if (!world) {

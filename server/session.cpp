@@ -24,11 +24,23 @@ std::mt19937_64 seeded() {
   return std::mt19937_64(seed);
 }
 
+/// What may make a client's scene another one.
+std::string why_another(const ServedScene& scene, SceneHash hash) {
+  if (scene.whole_hash == scene.hash)
+    return ": another file, or one that the client splits into clusters (granularity cluster) and "
+           "the server does not";
+  if (hash == scene.whole_hash)
+    return ": the same file, which the server splits into clusters (granularity cluster) and the "
+           "client does not";
+  return ": another file than the server's, which is split into clusters (granularity cluster)";
+}
+
 }  // namespace
 
 ServedScene served_scene(const Scene& scene, const OccluderSet& occluders) {
   ServedScene served;
   served.hash = scene.hash;
+  served.whole_hash = scene.whole_hash;
   served.slack_m = occluders.slack_m;
   wire::ObjectTable table;
   table.id = rank_order(scene);
@@ -38,6 +50,7 @@ ServedScene served_scene(const Scene& scene, const OccluderSet& occluders) {
     const Object& o = scene.objects[table.id[r]];
     table.node.push_back(o.node);
     table.instance.push_back(o.instance);
+    if (!scene.wholes.empty()) table.cluster.push_back(o.cluster);
     served.rank_of[table.id[r]] = r;
   }
   served.packed_table = wire::pack_table(table);
@@ -83,7 +96,8 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
   if (hello.scene_hash != 0 && hello.scene_hash != scene_.hash)
     return turn_away(wire::Refusal::kScene, "the client's scene has the hash " +
                                                 to_hex(hello.scene_hash) + ", the server's " +
-                                                to_hex(scene_.hash));
+                                                to_hex(scene_.hash) +
+                                                why_another(scene_, hello.scene_hash));
   Session session;
   session.reach = reach_;
   if (!hello.reach.empty()) {

@@ -30,6 +30,7 @@ struct ServedScene {
       packed_table;           ///< wire/object_table.h; goes into every Welcome as it is
   std::vector<Rank> rank_of;  ///< by id
   double slack_m = 0;         ///< of the occluders: reaches are compared with it
+  SceneHash whole_hash = 0;  ///< Scene::whole_hash: not `hash` when meshes were split into clusters
   std::uint32_t objects() const { return static_cast<std::uint32_t>(rank_of.size()); }
 };
 

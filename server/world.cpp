@@ -24,7 +24,9 @@ Result<OccluderSet> shrink_here(const Scene& scene, const Reach& reach, const Co
 Result<std::unique_ptr<World>> load_world(const WorldOptions& options, const Context& context) {
   auto world = std::make_unique<World>();
   context.say("loading " + options.scene.string());
-  auto scene = load_scene(options.scene, {}, context);
+  SceneOptions scene_options;
+  scene_options.granularity = options.granularity;
+  auto scene = load_scene(options.scene, scene_options, context);
   if (!scene) return scene.error();
   world->scene = std::move(*scene);
 

@@ -7,6 +7,7 @@
 #include "core/context.h"
 #include "core/result.h"
 #include "occluders/occluder_set.h"
+#include "scenes/clusters.h"
 #include "scenes/scene.h"
 #include "visibility/method.h"
 
@@ -31,6 +32,7 @@ struct WorldOptions {
   std::string default_reach = "cylinder:1.5,0.1";
   std::string method;    ///< empty: the first of method_list()
   unsigned threads = 1;  ///< inside one solve
+  Granularity granularity = Granularity::kObject;
 };
 
 /// Errors: those of load_scene, read_occluders, check_occluders, shrink and make_method.

@@ -94,14 +94,21 @@ Result<Vec3> parse_point(const std::string& text) {
   return p;
 }
 
-void SceneArgs::add_to(CLI::App& app) {
+void SceneArgs::add_to(CLI::App& app, bool splits) {
   app.add_option("SCENE", file, "glTF scene, .glb or .gltf")->required();
   app.add_flag("--honour-sidedness", honour_sidedness, "single-sided triangles do not block from behind (default: all block from both sides)");
+  if (splits)
+    app.add_option("--granularity", granularity, "object: one object a node or instance; cluster: large meshes are split into compact clusters of triangles")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"object", "cluster"}));
 }
+
+bool SceneArgs::clustered() const { return granularity == granularity_name(Granularity::kCluster); }
 
 Result<Scene> SceneArgs::load(const Context& context) const {
   SceneOptions options;
   options.honour_sidedness = honour_sidedness;
+  if (clustered()) options.granularity = Granularity::kCluster;
   auto scene = load_scene(file, options, context);
   if (scene)
     for (const std::string& w : scene->warnings) context.say("warning: " + w);

@@ -46,7 +46,10 @@ Result<Vec3> parse_point(const std::string& text);
 struct SceneArgs {
   std::filesystem::path file;
   bool honour_sidedness = false;
-  void add_to(CLI::App& app);
+  std::string granularity = "object";
+  /// `splits`: with --granularity.
+  void add_to(CLI::App& app, bool splits = true);
+  bool clustered() const;
   Result<Scene> load(const Context& context) const;
 };
 

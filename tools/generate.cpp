@@ -128,7 +128,7 @@ void add_generate(CLI::App& app, std::function<Outcome()>& action) {
 
   auto dress = std::make_shared<DressArgs>();
   CLI::App* d = sub->add_subcommand("dress", "real buildings -> the same with ground, windows, trees, lamps, and a walk");
-  dress->scene.add_to(*d);
+  dress->scene.add_to(*d, false);
   dress->out.add_to(*d);
   d->add_option("--seed", dress->options.seed, "of everything")->capture_default_str()->check(CLI::NonNegativeNumber);
   d->add_option("--max-triangles", dress->options.max_triangles, "budget, the buildings included")->capture_default_str()->check(CLI::NonNegativeNumber);

@@ -102,7 +102,7 @@ Outcome verify_record(const Args& args, const Context& context) {
   if (scene->hash != record->scene_hash)
     return mismatch("'" + args.record.string() + "' was recorded with scene " +
                     to_hex(record->scene_hash) + ", '" + args.scene.file.string() + "' is " +
-                    to_hex(scene->hash));
+                    to_hex(scene->hash) + " (another file, or the same with another --granularity)");
   if (scene->objects.size() != record->objects)
     return input_error("'" + args.record.string() + "' is of " + std::to_string(record->objects) + " objects, the scene has " +
                        std::to_string(scene->objects.size()));

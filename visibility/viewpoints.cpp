@@ -179,7 +179,7 @@ std::vector<FreeSpace::Group> FreeSpace::tiles() const {
     return i;
   };
   std::unordered_map<std::array<double, 3>, std::uint32_t, PositionHash> first_at;
-  for (const Object& o : scene_.objects) {
+  for (const Object& o : sources(scene_)) {
     const std::size_t n = scene_.mesh_of(o).triangles();
     if (o.always_visible || o.tag == OccluderTag::kNever || n == 0) continue;
     bool level = true;
@@ -213,7 +213,7 @@ void FreeSpace::find_grounds() {
   constexpr std::size_t kProbes = 32;
   const Vec3 half = scene_.bounds.empty() ? Vec3{0} : scene_.bounds.size() * 0.5;
   std::vector<Group> candidates = tiles();
-  for (const Object& o : scene_.objects) {
+  for (const Object& o : sources(scene_)) {
     const Vec3 size = o.bounds.size();
     if (o.always_visible || scene_.mesh_of(o).triangles() == 0 || size.x < half.x ||
         size.z < half.z)
@@ -227,9 +227,9 @@ void FreeSpace::find_grounds() {
     if (box.size().x < half.x || box.size().z < half.z) continue;
     std::size_t probes = 0;
     std::size_t under = 0;
-    const std::size_t step = std::max<std::size_t>(1, scene_.objects.size() / kProbes);
-    for (std::size_t i = 0; i < scene_.objects.size(); i += step) {
-      const Object& other = scene_.objects[i];
+    const std::size_t step = std::max<std::size_t>(1, sources(scene_).size() / kProbes);
+    for (std::size_t i = 0; i < sources(scene_).size(); i += step) {
+      const Object& other = sources(scene_)[i];
       if (std::find(group.begin(), group.end(), &other) != group.end()) continue;
       ++probes;
       if (below(group, {other.bounds.centre().x, other.bounds.hi.y, other.bounds.centre().z}))
@@ -241,7 +241,7 @@ void FreeSpace::find_grounds() {
 
 bool FreeSpace::inside_solid(const Vec3& p) const {
   if (inside_prism(p)) return true;
-  for (const auto* list : {&scene_.objects, &scene_.hidden_solids})
+  for (const auto* list : {&sources(scene_), &scene_.hidden_solids})
     for (const Object& o : *list)
       if (!o.always_visible && o.tag != OccluderTag::kNever && o.bounds.contains(p) &&
           inside_closed_piece(o, p))

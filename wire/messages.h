@@ -31,12 +31,13 @@ struct Hello {
   bool operator==(const Hello&) const = default;
 };
 
-/// rank -> (id, node, instance), structure of arrays, zstd-compressed inside the message.
+/// rank -> (id, node, instance, cluster), structure of arrays, zstd-compressed inside the message.
 /// `id` is a permutation of 0..N-1.
 struct ObjectTable {
   std::vector<ObjectId> id;
   std::vector<std::uint32_t> node;
   std::vector<std::uint32_t> instance;
+  std::vector<std::uint32_t> cluster{};  ///< empty: all 0, as no mesh was split
   bool operator==(const ObjectTable&) const = default;
 };
 
@@ -106,14 +107,15 @@ struct Bye {
 using Message = std::variant<Hello, Welcome, PoseMessage, PvsMessage, Refused, Bye>;
 
 inline constexpr std::size_t kMaxMessageBytes = 64U << 20U;
-/// A row of the table is 12 bytes.
+/// A row of the table is 12 bytes, 16 with clusters.
 inline constexpr std::size_t kMaxObjects = kMaxMessageBytes / 12;
-inline constexpr std::size_t kMaxNameBytes = 256;   ///< reach, method
-inline constexpr std::size_t kMaxTextBytes = 1024;  ///< Refused::text
+inline constexpr std::size_t kMaxClusters = kMaxMessageBytes / 16;  ///< objects in such a table
+inline constexpr std::size_t kMaxNameBytes = 256;                   ///< reach, method
+inline constexpr std::size_t kMaxTextBytes = 1024;                  ///< Refused::text
 
 /// One message as one frame. Strings are cut to their bounds. Requires: finite eyes; a table that
-/// is empty or has `objects` rows and whose ids are a permutation, at most kMaxMessageBytes / 12 of
-/// them.
+/// is empty or has `objects` rows and whose ids are a permutation, at most kMaxObjects of
+/// them, kMaxClusters with clusters.
 std::vector<std::byte> encode(const Message& message);
 
 /// A Welcome whose table (empty in `welcome`) is packed already, by pack_table(): for a server that

@@ -1,5 +1,5 @@
 #pragma once
-// The table rank -> (id, node, instance) <-> one zstd frame. SPEC.md, "Object table".
+// The table rank -> (id, node, instance, cluster) <-> one zstd frame. SPEC.md, "Object table".
 
 #include <cstddef>
 #include <cstdint>
@@ -11,10 +11,11 @@
 
 namespace ivis::wire {
 
-/// Requires: columns of one length; `id` a permutation of 0..N-1.
+/// Requires: columns of one length, `cluster` that or empty; `id` a permutation of 0..N-1.
 std::vector<std::uint8_t> pack_table(const ObjectTable& table);
 
-/// Errors: kInput if the frame does not hold exactly `objects` rows or the ids are no permutation.
+/// Errors: kInput if the frame does not hold exactly `objects` rows of three columns, or of four
+/// (at most kMaxClusters), or the ids are no permutation.
 /// Allocates only what `objects` (at most kMaxObjects) asks for, once the frame's own size agrees
 /// with it.
 Result<ObjectTable> unpack_table(std::span<const std::uint8_t> frame, std::uint32_t objects);

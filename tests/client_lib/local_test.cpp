@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "client_lib/client.h"
+#include "scenes/clusters.h"
 #include "tests/server/fake_method.h"
 
 namespace ivis::test {
@@ -131,6 +132,74 @@ TEST_F(LocalClient, ClosesWhileItSolves) {
     TearDown();
     SetUp();
   }
+}
+
+/// A large mesh between two small ones.
+Scene clustered_scene() {
+  Mesh large;
+  large.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  for (int i = 0; i < 600; ++i)
+    large.indices.insert(large.indices.end(), {0, 1, 2});
+  large.primitives = {{0, 600, true, true}};
+  SceneBuilder b;
+  b.add_box({0, 0, 0}, {1, 1, 1});
+  b.add_mesh(large);
+  b.add_box({5, 0, 0}, {6, 1, 1});
+  return *split_into_clusters(std::move(b).finish());
+}
+
+TEST(LocalClusters, OfAnInstanceHaveConsecutiveIdsThatTheClientTells) {
+  const Scene scene = clustered_scene();
+  ASSERT_EQ(scene.objects.size(), 6U);
+  client::LocalWorld world;
+  world.reach = Reach::disc(1);
+  world.method = std::make_shared<NearMethod>(scene);
+  world.catalogue = client::catalogue_of(scene, world.reach, *world.method);
+  ASSERT_TRUE(client::check_catalogue(world.catalogue));
+  ivis_client* c =
+      ivis_client_adopt_source_(client::make_local_source(world).release(), IVIS_POLICY_EVERYTHING);
+  std::uint32_t first = 9, count = 9, id = 9, cluster = 9, node = 9;
+  ASSERT_EQ(ivis_object_ids(c, 1, 0, &first, &count), IVIS_OK);
+  EXPECT_EQ(first, 1U);
+  EXPECT_EQ(count, 4U);
+  ASSERT_EQ(ivis_object_ids(c, 2, 0, &first, &count), IVIS_OK);
+  EXPECT_EQ(first, 5U);
+  EXPECT_EQ(count, 1U);
+  ASSERT_EQ(ivis_object_id(c, 1, 0, &id), IVIS_OK);
+  EXPECT_EQ(id, 1U);
+  for (std::uint32_t k = 0; k < 4; ++k) {
+    ASSERT_EQ(ivis_object_cluster(c, 1 + k, &cluster), IVIS_OK);
+    EXPECT_EQ(cluster, k);
+    ASSERT_EQ(ivis_object_node(c, 1 + k, &node, nullptr), IVIS_OK);
+    EXPECT_EQ(node, 1U);
+  }
+  EXPECT_EQ(ivis_object_ids(c, 1, 0, nullptr, nullptr), IVIS_OK);
+  EXPECT_EQ(ivis_object_ids(c, 1, 1, &first, &count), IVIS_ERROR_ARGUMENT);
+  EXPECT_EQ(ivis_object_ids(c, 3, 0, &first, &count), IVIS_ERROR_ARGUMENT);
+  EXPECT_EQ(ivis_object_cluster(c, 6, &cluster), IVIS_ERROR_ARGUMENT);
+  EXPECT_EQ(ivis_object_cluster(c, 0, nullptr), IVIS_ERROR_ARGUMENT);
+  ivis_client_close(c);
+}
+
+TEST(LocalClusters, ATableWithAGapOrOutOfOrderIsRefused) {
+  const auto sound = [](std::vector<std::uint32_t> node, std::vector<std::uint32_t> cluster) {
+    client::Catalogue c;
+    c.instance.resize(node.size());
+    c.node = std::move(node);
+    c.cluster = std::move(cluster);
+    return check_catalogue(c).has_value();
+  };
+  EXPECT_TRUE(sound({}, {}));
+  EXPECT_TRUE(sound({1, 2}, {}));
+  EXPECT_TRUE(sound({1, 1, 2}, {0, 1, 0}));
+  EXPECT_FALSE(sound({1, 1, 2}, {}));
+  EXPECT_FALSE(sound({1, 1, 2}, {0, 2, 0}));
+  EXPECT_FALSE(sound({1, 1, 2}, {1, 2, 0}));
+  EXPECT_FALSE(sound({1, 1, 2}, {0, 1, 1}));
+  EXPECT_FALSE(sound({1, 1, 2}, {0, 0, 0}));
+  EXPECT_FALSE(sound({2, 1}, {0, 1}));
+  EXPECT_FALSE(sound({2, 1}, {0, 0}));
+  EXPECT_FALSE(sound({1, 1}, {0, 1, 2}));
 }
 
 }  // namespace

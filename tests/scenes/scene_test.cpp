@@ -133,6 +133,8 @@ TEST(FinishScene, HashesAllThatVisibilityDependsOn) {
       hash_of([](Scene& s) { s.hidden_solids = s.objects; }),
       hash_of([](Scene& s) { s.objects.push_back(s.objects[0]); }),
       hash_of([](Scene& s) { s.honour_sidedness = true; }),
+      hash_of([](Scene& s) { s.wholes = s.objects; }),
+      hash_of([](Scene& s) { s.wholes = s.objects, s.objects[0].cluster = 1; }),
   };
   std::sort(hashes.begin(), hashes.end());
   EXPECT_EQ(std::adjacent_find(hashes.begin(), hashes.end()), hashes.end());

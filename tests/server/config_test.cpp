@@ -69,6 +69,8 @@ TEST_F(ConfigFile, WrongValuesNameLineKeyFoundAndExpected) {
   EXPECT_THAT(error_of("reach = \"disk:1\""), HasSubstr("disk:1"));
   EXPECT_THAT(error_of("listen = \"http://x\""), HasSubstr("expected tcp://"));
   EXPECT_THAT(error_of("log_level = \"loud\""), HasSubstr("expected debug"));
+  EXPECT_THAT(error_of("granularity = \"mesh\""),
+              HasSubstr("key 'granularity': found 'mesh', expected object or cluster"));
   EXPECT_THAT(error_of("json_logs = 1"), HasSubstr("expected true or false"));
   EXPECT_THAT(error_of("scene = 5"), HasSubstr("expected a string"));
 }
@@ -108,6 +110,24 @@ TEST(Config, AMistakeInAFlagIsAnArgumentErrorOneInTheEnvironmentIsInput) {
   const auto c = configure({}, variables({{"IVISD_MAX_CLIENTS", "many"}}), {});
   EXPECT_EQ(c.error().code, ErrorCode::kInput);
   EXPECT_THAT(c.error().message, HasSubstr("environment IVISD_MAX_CLIENTS"));
+}
+
+TEST_F(ConfigFile, GranularityComesFromFileEnvironmentOrFlag) {
+  const auto granularity = [&](const std::map<std::string, std::string>& flags,
+                               const std::map<std::string, std::string>& environment) {
+    const auto c = configure(flags, variables(environment), file);
+    EXPECT_TRUE(c) << (c ? "" : c.error().message);
+    return c->config.granularity;
+  };
+  write("");
+  EXPECT_EQ(granularity({}, {}), Granularity::kObject);
+  EXPECT_EQ(granularity({}, {{"IVISD_GRANULARITY", "cluster"}}), Granularity::kCluster);
+  EXPECT_EQ(granularity({{"granularity", "cluster"}}, {}), Granularity::kCluster);
+  write("granularity = \"cluster\"\n");
+  const auto c = configure({}, variables({}), file);
+  ASSERT_TRUE(c) << c.error().message;
+  EXPECT_EQ(c->config.granularity, Granularity::kCluster);
+  EXPECT_THAT(to_string(*c), HasSubstr("granularity = 'cluster'"));
 }
 
 TEST(Config, AbsentFileIsAnError) {

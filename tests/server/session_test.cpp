@@ -232,6 +232,23 @@ TEST_F(Sessions, RefusesAnotherSceneNamingBothHashes) {
   EXPECT_NE(text.find(own), std::string::npos) << text;
 }
 
+TEST_F(Sessions, RefusesTheSameSceneAtTheOtherGranularityAndSaysSo) {
+  const auto text_for = [&](SceneHash hash) {
+    wire::Hello hello;
+    hello.scene_hash = hash;
+    const auto m = say({"a", 0, {}, {}}, hello);
+    EXPECT_EQ(reason(m), Refusal::kScene);
+    return std::get<wire::Refused>(*m).text;
+  };
+  EXPECT_NE(text_for(1).find("client splits into clusters (granularity cluster)"),
+            std::string::npos);
+  served.whole_hash = 0x5678;  // as of a scene that was split
+  EXPECT_NE(text_for(0x5678).find("the same file, which the server splits into clusters"),
+            std::string::npos);
+  EXPECT_NE(text_for(1).find("another file than the server's, which is split into clusters"),
+            std::string::npos);
+}
+
 TEST_F(Sessions, RefusesAnotherVersion) {
   wire::Hello hello;
   hello.version = 99;

@@ -39,7 +39,7 @@ Mat4 placed(const Vec3& lo, const Vec3& size) {
   return m;
 }
 
-std::string town_glb(double shift_of_last_house) {
+GlbScene town(double shift_of_last_house) {
   GlbScene scene;
   scene.materials.push_back({});
   scene.meshes = {unit_cube(), unit_square()};
@@ -70,6 +70,35 @@ std::string town_glb(double shift_of_last_house) {
   ground.mesh = 1;
   ground.to_world = placed({-50, 0, -50}, {300, 1, 270});
   scene.nodes.push_back(ground);
+  return scene;
+}
+
+/// All instances of all nodes, in place, as one primitive.
+GlbScene merged(const GlbScene& town) {
+  GlbPrimitive all;
+  const auto add = [&](const GlbMesh& mesh, const Mat4& to_world) {
+    for (const GlbPrimitive& p : mesh.primitives) {
+      const auto base = static_cast<std::uint32_t>(all.positions.size());
+      for (const auto& v : p.positions)
+        all.positions.emplace_back(Vec3(to_world * glm::dvec4(Vec3(v), 1)));
+      for (const std::uint32_t i : p.indices)
+        all.indices.push_back(base + i);
+    }
+  };
+  for (const GlbNode& node : town.nodes) {
+    const GlbMesh& mesh = town.meshes[node.mesh];
+    if (node.instances.empty()) add(mesh, node.to_world);
+    for (const GlbInstance& i : node.instances)
+      add(mesh, node.to_world * placed(Vec3(i.translation), Vec3(i.scale)));
+  }
+  GlbScene out;
+  out.materials.push_back({});
+  out.meshes = {{"town", {all}}};
+  out.nodes.emplace_back();
+  return out;
+}
+
+std::string glb_of(const GlbScene& scene) {
   const auto bytes = write_glb(scene);
   EXPECT_TRUE(bytes) << (bytes ? "" : bytes.error().message);
   return bytes ? *bytes : "";
@@ -80,7 +109,7 @@ std::string town_glb(double shift_of_last_house) {
 const std::string SmallTown::kEye = "10,1.7,28";
 
 SmallTown::SmallTown() : scene(folder / "town.glb"), path(folder / "path.csv") {
-  write(scene, town_glb(0));
+  write(scene, glb_of(town(0)));
   std::string rows = "note,z,t,y,x,speed\n";
   for (std::size_t i = 0; i < kPoses; ++i)
     rows += "a,28," + std::to_string(i) + ",1.7," + std::to_string(10 + 25 * i) + ",1\n";
@@ -89,7 +118,13 @@ SmallTown::SmallTown() : scene(folder / "town.glb"), path(folder / "path.csv") {
 
 std::string write_other_town(const Folder& folder) {
   const std::string file = folder / "other.glb";
-  write(file, town_glb(0.5));
+  write(file, glb_of(town(0.5)));
+  return file;
+}
+
+std::string write_merged_town(const Folder& folder) {
+  const std::string file = folder / "merged.glb";
+  write(file, glb_of(merged(town(0))));
   return file;
 }
 

@@ -26,4 +26,7 @@ struct SmallTown {
 /// The same town with its last house moved: another scene hash.
 std::string write_other_town(const Folder& folder);
 
+/// The small town as one mesh of one node, without a name.
+std::string write_merged_town(const Folder& folder);
+
 }  // namespace ivis::test

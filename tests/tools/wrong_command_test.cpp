@@ -29,6 +29,10 @@ TEST(ToolRefuses, UsageErrorsWithCodeTwo) {
   expect_refused({"frobnicate"}, 2, "frobnicate");
   expect_refused({"info"}, 2, "SCENE");
   expect_refused({"info", t.scene, "--jason"}, 2, "--jason");
+  for (const std::string command : {"info", "objects"})
+    expect_refused({command, t.scene, "--granularity", "triangle"}, 2, "triangle");
+  expect_refused({"pvs", t.scene, "--eye", eye, "--reach", "disc:1", "--granularity", "mesh"}, 2,
+                 "mesh");
   expect_refused({"pvs", t.scene, "--reach", "disc:1"}, 2, "--eye");
   expect_refused({"pvs", t.scene, "--eye", eye}, 2, "--reach");
   expect_refused({"pvs", t.scene, "--eye", eye, "--path", t.path, "--reach", "disc:1"}, 2,

@@ -53,6 +53,26 @@ TEST(ObjectTable, KeepsNumbersThatFillTheirWord) {
   EXPECT_EQ(*back, table);
 }
 
+TEST(ObjectTable, KeepsClustersAndSpendsNothingOnTheirAbsence) {
+  ObjectTable table = shuffled(500, false);
+  const auto without = pack_table(table);
+  EXPECT_EQ(ZSTD_getFrameContentSize(without.data(), without.size()), 500U * 12);
+  for (const ObjectId id : table.id)
+    table.cluster.push_back(id % 7);
+  const auto frame = pack_table(table);
+  EXPECT_EQ(ZSTD_getFrameContentSize(frame.data(), frame.size()), 500U * 16);
+  const auto back = unpack_table(frame, 500);
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(*back, table);
+}
+
+TEST(ObjectTable, RejectsMoreClustersThanAMessageHasRoomFor) {
+  const std::uint32_t n = kMaxClusters + 1;
+  const auto frame = frame_of(std::vector<std::uint8_t>(16 * std::size_t{n}));
+  EXPECT_NE(error_of(frame, n).find("expected " + std::to_string(12 * std::size_t{n})),
+            std::string::npos);
+}
+
 // Only the permutation costs bytes: for 100,000 random ids that is 17 bits each.
 TEST(ObjectTable, SpendsItsBytesOnTheOrderAlone) {
   EXPECT_LT(pack_table(shuffled(100000, true)).size(), 100000U * 20 / 8);

@@ -7,8 +7,10 @@
 #include <string>
 
 #include <gtest/gtest.h>
+#include <zstd.h>
 
 #include "wire/messages.h"
+#include "wire/object_table.h"
 #include "wire/pvs_codec.h"
 
 namespace ivis::wire {
@@ -77,8 +79,9 @@ TEST(WireSpec, ExampleIsWhatTheLibraryWrites) {
   const auto blocks = golden();
   Bytes full, difference;
   auto messages = example(full, difference);
-  ASSERT_EQ(blocks.size(), messages.size() + 2) << "blocks in SPEC.md";
+  ASSERT_EQ(blocks.size(), messages.size() + 3) << "blocks in SPEC.md";
   for (const auto& [name, bytes] : blocks) {
+    if (name == "table") continue;  // below
     if (name == "payload_full")
       EXPECT_EQ(hex(bytes), hex(full));
     else if (name == "payload_difference")
@@ -102,6 +105,22 @@ TEST(WireSpec, ExampleIsReadAsWhatItSays) {
   const auto two = decode_pvs(blocks["payload_difference"], *one);
   ASSERT_TRUE(two) << two.error().message;
   EXPECT_EQ(two->set, set_of({4, 5, 6, 7, 40, 69}));
+}
+
+TEST(WireSpec, TableWithClustersIsWhatTheLibraryWritesAndReads) {
+  const Bytes golden_table = golden()["table"];
+  // By rank.
+  const ObjectTable table{{2, 0, 3, 1, 4}, {3, 3, 5, 3, 5}, {0, 0, 0, 0, 1}, {2, 0, 0, 1, 0}};
+  const auto frame = pack_table(table);
+  Bytes raw(1000);
+  raw.resize(ZSTD_decompress(raw.data(), raw.size(), frame.data(), frame.size()));
+  EXPECT_EQ(hex(raw), hex(golden_table));
+  std::vector<std::uint8_t> packed(ZSTD_compressBound(golden_table.size()));
+  packed.resize(
+      ZSTD_compress(packed.data(), packed.size(), golden_table.data(), golden_table.size(), 1));
+  const auto read = unpack_table(packed, 5);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(*read, table);
 }
 
 }  // namespace

@@ -137,12 +137,21 @@ typedef struct ivis_info {
 /* Errors: CONNECTION while no server has been met. */
 IVIS_API ivis_status ivis_client_info(const ivis_client* client, ivis_info* out);
 
-/* id <-> glTF node index and instance (0 unless EXT_mesh_gpu_instancing).
+/* id <-> glTF node index and instance (0 unless EXT_mesh_gpu_instancing). Where the server splits
+ * large meshes into clusters, several ids have one node and instance: consecutive ones, by
+ * ascending cluster, of which ivis_object_id() gives the first.
  * Errors: ARGUMENT for one that the scene has not; CONNECTION while no server has been met. */
 IVIS_API ivis_status ivis_object_node(const ivis_client* client, uint32_t id, uint32_t* node,
                                       uint32_t* instance);
 IVIS_API ivis_status ivis_object_id(const ivis_client* client, uint32_t node, uint32_t instance,
                                     uint32_t* id);
+/* All ids of an instance: *first_id to *first_id + *count - 1; the k-th, from 0, is its cluster k.
+ * `ivis objects --granularity cluster --json --triangle-numbers` says which triangles those are.
+ * Either pointer may be NULL. Errors: as above. */
+IVIS_API ivis_status ivis_object_ids(const ivis_client* client, uint32_t node, uint32_t instance,
+                                     uint32_t* first_id, uint32_t* count);
+/* The cluster of an object within its instance; 0 when it was not split. Errors: as above. */
+IVIS_API ivis_status ivis_object_cluster(const ivis_client* client, uint32_t id, uint32_t* cluster);
 
 /* What went wrong last, for a person; "" if nothing did. Valid until the next call with this
  * client. */

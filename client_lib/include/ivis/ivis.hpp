@@ -74,6 +74,19 @@ class VisibilityClient {
     if (ivis_object_id(client_.get(), node, instance, &id) != IVIS_OK) return std::nullopt;
     return id;
   }
+  /// First id and count: several where meshes are split into clusters.
+  std::optional<std::pair<std::uint32_t, std::uint32_t>> ids_of(std::uint32_t node,
+                                                                std::uint32_t instance = 0) const {
+    std::pair<std::uint32_t, std::uint32_t> out;
+    if (ivis_object_ids(client_.get(), node, instance, &out.first, &out.second) != IVIS_OK)
+      return std::nullopt;
+    return out;
+  }
+  std::optional<std::uint32_t> cluster_of(std::uint32_t id) const {
+    std::uint32_t cluster = 0;
+    if (ivis_object_cluster(client_.get(), id, &cluster) != IVIS_OK) return std::nullopt;
+    return cluster;
+  }
   std::optional<std::pair<std::uint32_t, std::uint32_t>> node_of(std::uint32_t id) const {
     std::pair<std::uint32_t, std::uint32_t> out;
     if (ivis_object_node(client_.get(), id, &out.first, &out.second) != IVIS_OK)

@@ -18,7 +18,8 @@ typedef struct ivis_local_options {
   const char* reach;         /* NULL: that of the occluder file, or cylinder:1.5,0.1 */
   const char* method;        /* NULL: the default */
   ivis_policy policy;
-  uint32_t threads; /* inside one solve; 1 */
+  uint32_t threads;        /* inside one solve; 1 */
+  const char* granularity; /* "object" or "cluster", as the occluder file was made; NULL: object */
 } ivis_local_options;
 
 IVIS_API ivis_local_options ivis_local_options_default(void);
