@@ -219,6 +219,7 @@ Result<OccluderSet> SolveArgs::get_occluders(const Scene& scene, const Reach& wa
   if (occluders.empty()) {
     ShrinkOptions options;
     options.reach = wanted;
+    options.margins = method == "occlusion-map";  // nothing else draws them
     auto shrunk = shrink(scene, options, FastEroder{}, context);
     if (!shrunk) return shrunk.error();
     return std::move(shrunk->set);

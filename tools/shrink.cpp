@@ -52,10 +52,11 @@ Outcome run(const Args& args) {
     Json left_out = Json::object();
     for (const auto& [reason, count] : r.left_out) left_out[reason] = count;
     Json out{{"occluders_in", r.occluders_in}, {"occluders_out", r.occluders_out}, {"left_out", left_out},
-             {"convex_solids", r.convex_solids}, {"convex_pieces", r.convex_pieces},
-             {"sheet_planes", r.sheet_planes}, {"sheet_tiles", r.sheet_tiles}, {"sheet_faces", r.sheet_faces},
-             {"sheet_seconds", r.sheet_seconds},
-             {"volume_kept", r.volume_kept()}, {"seconds", r.seconds}};
+             {"volume_kept", r.volume_kept()}, {"seconds", r.seconds},
+             {"parts", {{"convex_solids", r.convex_solids}, {"convex_pieces", r.convex_pieces},
+                        {"prism_pieces", shrunk->set.prism_pieces.size()}, {"solid_pieces", shrunk->set.solid_pieces.size()},
+                        {"sheet_planes", r.sheet_planes}, {"sheet_tiles", r.sheet_tiles}, {"sheet_faces", r.sheet_faces},
+                        {"sheet_seconds", r.sheet_seconds}, {"height_field_cells", shrunk->set.height_field.heights.size()}}}};
     if (r.voxels) {
       const VoxelReport& v = *r.voxels;
       Json leaks = Json::array();

@@ -63,7 +63,8 @@ TEST(ToolShrink, WritesAFileAndPrintsTheFixedKeys) {
     ASSERT_EQ(ran.code, 0) << ran.errors;
     const Json j = ran.json();
     EXPECT_EQ(keys(j),
-              (Keys{"occluders_in", "occluders_out", "left_out", "volume_kept", "seconds"}));
+              (Keys{"occluders_in", "occluders_out", "left_out", "volume_kept", "seconds", "parts"}));
+    EXPECT_GE(j["parts"]["prism_pieces"], SmallTown::kHouses) << "for the occlusion map";
     EXPECT_GE(j["occluders_out"], SmallTown::kHouses);
     // 28 x 22 m less 1.5 m all round; a few centimetres of slack.
     EXPECT_NEAR(j["volume_kept"].get<double>(), 25.0 * 19 / (28 * 22), 0.01);

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <glm/gtc/matrix_transform.hpp>
 #include <gtest/gtest.h>
+#include <glm/gtc/matrix_transform.hpp>
 
 #include "occluders/fast_erosion.h"
 #include "occluders/shrink.h"
@@ -94,6 +94,35 @@ TEST(OcclusionMap, HidesInATownThatIsTurnedInSpaceWhereNothingIsAPrism) {
     ASSERT_TRUE(pvs.everything_because.empty()) << pvs.everything_because;
     EXPECT_LT(pvs.objects.size(), scene.objects.size() / 2);
     EXPECT_EQ(misses(verifier, pvs), 0U);
+  }
+}
+
+TEST(OcclusionMap, APlaneBeyondWhichNothingLiesLosesNothingToTheReach) {
+  const Mat4 turn = glm::rotate(Mat4{1}, 0.7, glm::normalize(Vec3{1, 2, 3}));
+  for (const bool something_below : {false, true}) {
+    SceneBuilder b;
+    b.add_box({10, 0, -30}, {16, 20, 30});
+    const ObjectId low = b.add_box({30, 0, -1}, {31, 0.3, 1}, OccluderTag::kNever);
+    if (something_below) b.add_box({30, -1, 5}, {31, -0.5, 6}, OccluderTag::kNever);
+    const Scene upright = std::move(b).finish();
+    Scene scene;
+    scene.meshes = upright.meshes;
+    scene.node_names = upright.node_names;
+    for (Object o : upright.objects) {
+      o.to_world = turn * o.to_world;
+      scene.objects.push_back(o);
+    }
+    ASSERT_TRUE(finish_scene(scene));
+    const Reach reach = Reach::ball(1);
+    const OccluderSet set = shrunk(scene, reach);
+    const Pvs pvs = solved(scene, set, {Vec3(turn * glm::dvec4(0, 1.7, 0, 1)), reach});
+    // Shrunk at its base too, the block would let one look under it.
+    EXPECT_EQ(lists(pvs, low), something_below);
+    EXPECT_EQ(misses(Verifier(scene, &set, BlockerChoice::kOccluding), pvs), 0U);
+    // From below that plane the rule says nothing.
+    const Pvs from_below = solved(scene, set, {Vec3(turn * glm::dvec4(0, -4, 0, 1)), reach});
+    EXPECT_EQ(misses(Verifier(scene, &set, BlockerChoice::kOccluding), from_below), 0U);
+    EXPECT_TRUE(lists(from_below, low));
   }
 }
 
