@@ -65,6 +65,7 @@ Status add_convex_and_sheets(const Scene& scene, const std::vector<const Object*
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (!found[i].pieces.empty() && found[i].left_out.empty()) {
       prisms[i].left_out.erase("open mesh");
+      prisms[i].left_out.erase("inside out");
       prisms[i].left_out.erase("too thin or too sloped for a prism");
     }
     for (ConvexPiece& piece : found[i].pieces) {
@@ -82,13 +83,16 @@ Status add_convex_and_sheets(const Scene& scene, const std::vector<const Object*
     }
   }
   std::vector<SolidPiece> shrunk(odd.size());
-  const SceneSupport support(scene);
-  if (options.margins)
+  if (options.margins) {
+    const SceneSupport support(scene);
+    const auto floor = common_floor(odd, support);
     parallel_for(context, odd.size(), [&](std::size_t k) {
-      shrunk[k] = shrink_convex(odd[k], reach, set.margins_m, &support);
+      shrunk[k] = shrink_convex(odd[k], reach, set.margins_m, &support, floor);
     });
+  }
   for (SolidPiece& piece : shrunk)
-    if (!piece.levels.empty()) set.solid_pieces.push_back(std::move(piece));
+    if (!piece.levels.empty() || !piece.floored_levels.empty())
+      set.solid_pieces.push_back(std::move(piece));
   report.convex_solids += odd.size();
   report.convex_pieces += set.solid_pieces.size();
   std::move(odd.begin(), odd.end(), std::back_inserter(set.convex_solids));

@@ -357,39 +357,74 @@ bool SceneSupport::within(const Vec3& normal, double offset) const {
   double most = -std::numeric_limits<double>::infinity();
   for (const auto* list : {&scene_.objects, &scene_.hidden_solids})
     for (const Object& o : *list) {
-      if (o.always_visible) return false;  // who knows where it goes
+      if (o.always_visible) continue;  // listed whatever hides it
       const Mesh& mesh = scene_.mesh_of(o);
       for (const auto& p : mesh.positions)
         most = std::max(most, glm::dot(normal, Vec3(o.to_world * glm::dvec4(Vec3(p), 1.0))));
       if (mesh.positions.empty()) most = std::max(most, glm::dot(normal, Vec3(o.to_world[3])));
-      if (most > offset) return false;
     }
   const std::lock_guard lock(mutex_);
   support_[key] = most;
   return most <= offset;
 }
 
-SolidPiece shrink_convex(const ConvexSolid& solid, const Reach& reach,
-                         const std::vector<double>& margins_m, const SceneSupport* scene) {
-  SolidPiece piece;
-  std::vector<bool> is_floor(solid.planes.size(), false);
-  if (scene != nullptr) {
-    const Vec3 size = solid.bounds.size();
-    // The solid's planes lie a little inside its faces, and corners are rounded.
-    const double slack = 2e-6 * std::max({size.x, size.y, size.z}) + 1e-6;
-    for (std::size_t i = 0; i < solid.planes.size(); ++i) {
-      is_floor[i] = scene->within(solid.planes[i].normal, solid.planes[i].offset + slack);
-      if (is_floor[i]) piece.floors.push_back(solid.planes[i]);
+namespace {
+
+/// Below the slack that occluders are shrunk by.
+constexpr double kMostFloorSlackM = 2e-4;
+
+/// A solid's planes lie a little inside its faces, and corners are rounded.
+double floor_slack(const ConvexSolid& solid) {
+  const Vec3 size = solid.bounds.size();
+  return std::min(2e-6 * std::max({size.x, size.y, size.z}) + 1e-6, kMostFloorSlackM);
+}
+
+bool same_plane(const Plane& a, const Plane& b, double slack) {
+  return glm::length(a.normal - b.normal) < 1e-9 && std::abs(a.offset - b.offset) <= slack;
+}
+
+}  // namespace
+
+std::optional<ConvexSolid::Plane> common_floor(const std::vector<ConvexSolid>& solids,
+                                               const SceneSupport& scene) {
+  std::map<std::array<std::int64_t, 4>, std::pair<std::size_t, Plane>> count;
+  std::pair<std::size_t, Plane> best{1, {}};
+  for (const ConvexSolid& solid : solids)
+    for (const Plane& p : solid.planes) {
+      if (!scene.within(p.normal, p.offset + floor_slack(solid))) continue;
+      const std::array<std::int64_t, 4> key{
+          std::llround(p.normal.x * 1e6), std::llround(p.normal.y * 1e6),
+          std::llround(p.normal.z * 1e6), std::llround(p.offset * 1e3)};
+      auto& entry = count.try_emplace(key, 0, p).first->second;
+      if (++entry.first > best.first) best = entry;
     }
-  }
-  for (const double margin : margins_m) {
-    ConvexSolid level = shrunk(solid, reach, margin);
+  return best.first > 1 ? std::optional<Plane>(best.second) : std::nullopt;
+}
+
+SolidPiece shrink_convex(const ConvexSolid& solid, const Reach& reach,
+                         const std::vector<double>& margins_m, const SceneSupport* scene,
+                         const std::optional<ConvexSolid::Plane>& floor) {
+  SolidPiece piece;
+  std::size_t base = solid.planes.size();
+  if (floor && scene != nullptr)
     for (std::size_t i = 0; i < solid.planes.size(); ++i)
-      if (is_floor[i]) level.planes[i].offset = solid.planes[i].offset;
-    FaceMesh mesh = face_mesh(level);
+      if (const Plane& p = solid.planes[i];
+          same_plane(p, *floor, 1e-3) && scene->within(p.normal, p.offset + floor_slack(solid)))
+        base = i;
+  for (const double margin : margins_m) {
+    FaceMesh mesh = face_mesh(shrunk(solid, reach, margin));
     if (mesh.empty()) break;
     piece.levels.push_back(std::move(mesh));
   }
+  if (base == solid.planes.size()) return piece;
+  for (const double margin : margins_m) {
+    ConvexSolid level = shrunk(solid, reach, margin);
+    level.planes[base].offset = solid.planes[base].offset;
+    FaceMesh mesh = face_mesh(level);
+    if (mesh.empty()) break;
+    piece.floored_levels.push_back(std::move(mesh));
+  }
+  if (!piece.floored_levels.empty()) piece.floors.push_back(solid.planes[base]);
   return piece;
 }
 

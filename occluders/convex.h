@@ -66,8 +66,9 @@ ConvexSolid shrunk(const ConvexSolid& solid, const Reach& reach, double margin_m
 class SceneSupport {
  public:
   explicit SceneSupport(const Scene& scene);
-  /// Is every corner of every triangle in { x : normal.x <= offset }? Cost: usually a few hundred
-  /// products; those of all corners where the answer is yes, once for a normal.
+  /// Is every corner of every triangle in { x : normal.x <= offset }? Movers do not count: they are
+  /// listed whatever hides them. Cost: usually a few hundred products; those of all corners once a
+  /// normal that few samples lie beyond.
   bool within(const Vec3& normal, double offset) const;
 
  private:
@@ -77,12 +78,17 @@ class SceneSupport {
   mutable std::map<std::array<double, 3>, double> support_;
 };
 
+/// The plane of the most solids, at least two, beyond which the scene has nothing: the ground they
+/// stand on, however the scene is turned.
+std::optional<ConvexSolid::Plane> common_floor(const std::vector<ConvexSolid>& solids,
+                                               const SceneSupport& scene);
+
 /// The solid at every margin, each level in E(solid, reach + B(margin)); ends where it vanishes.
-/// With `scene`, a plane beyond which the scene has nothing is a floor: it stays where it is, and
-/// the piece may be drawn for cells on its inner side only (SolidPiece::floors). No sight line from
-/// there to anything listed gets past that plane, so the solid might as well go on beyond it, and
+/// If `floor` is one of its planes, floored_levels leave that plane where it is: no sight line
+/// from before it to anything listed gets past it, so the solid might as well go on beyond, and
 /// then loses nothing there (as docs/theory.md, 4, downward extension, but for any direction).
 SolidPiece shrink_convex(const ConvexSolid& solid, const Reach& reach,
-                         const std::vector<double>& margins_m, const SceneSupport* scene = nullptr);
+                         const std::vector<double>& margins_m, const SceneSupport* scene = nullptr,
+                         const std::optional<ConvexSolid::Plane>& floor = {});
 
 }  // namespace ivis

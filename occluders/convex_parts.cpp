@@ -5,6 +5,9 @@
 namespace ivis {
 namespace {
 
+/// The sweep is quadratic at worst; an outline of a building has tens.
+constexpr std::size_t kMostEdges = 20000;
+
 struct Edge {
   Vec2 low, high;  ///< low.y < high.y
   double x_at(double y) const {
@@ -37,6 +40,7 @@ std::vector<std::array<Vec2, 4>> convex_parts(const Polygon& polygon) {
       if (a.y > b.y) std::swap(a, b);
       edges.push_back({a, b});
     }
+  if (edges.size() > kMostEdges) return {};
   std::sort(levels.begin(), levels.end());
   levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
   std::sort(edges.begin(), edges.end(),
@@ -80,6 +84,8 @@ std::vector<std::array<Vec2, 4>> convex_parts(const Polygon& polygon) {
                        [&](const Open& n) { return n.left == o.left && n.right == o.right; }))
         close(o, from);
     open = std::move(now);
+    // Rings that do not cross give a few parts a corner; no parts at all are safe.
+    if (parts.size() > 4 * edges.size() + 16) return {};
   }
   for (const Open& o : open)
     close(o, levels.back());

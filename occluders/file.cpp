@@ -349,6 +349,9 @@ std::string encode_occluders(const OccluderSet& set) {
     for (const FaceMesh& level : piece.levels)
       out.mesh(level);
     out.planes(piece.floors);
+    out.u32(piece.floored_levels.size());
+    for (const FaceMesh& level : piece.floored_levels)
+      out.mesh(level);
   }
   out.numbers(set.sheet_radii_m);
   out.u64(set.sheets.size());
@@ -432,10 +435,11 @@ Result<OccluderSet> decode_occluders(std::span<const std::byte> bytes, const std
       level = in.prisms("prisms of a piece");
     if (in.failed()) break;
   }
-  set.solid_pieces.resize(in.count("solid pieces", 8, 0, 8));
+  set.solid_pieces.resize(in.count("solid pieces", 8, 0, 12));
   for (SolidPiece& piece : set.solid_pieces) {
     piece.levels = in.meshes(set.margins_m.size());
     piece.floors = in.planes("floors of a piece", 0);
+    piece.floored_levels = in.meshes(set.margins_m.size());
     if (in.failed()) break;
   }
   set.sheet_radii_m = in.ladder("sheet radii");

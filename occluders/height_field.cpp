@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "core/view_cell.h"
 #include "occluders/ground_soup.h"
@@ -98,12 +99,29 @@ class Raster {
   // n = 1 is told from 0 and 2 by an integer, not by a tolerance. Where n is 1 the triangles meet
   // edge to edge, heights included, so the surface is a function and continuous - and remains so
   // across the border to a neighbour of the same kind, as cells are looked at with their borders.
-  HeightField field() {
-    for (const std::uint32_t t : piece_.triangles)
+  // Nothing when the context was stopped or the triangles lie over so many cells that they cannot
+  // be a surface seen from above: those of one touch each cell a few times, and themselves.
+  std::optional<HeightField> field(const Context& context) {
+    std::size_t budget = 64 * least_.size() + 64 * piece_.triangles.size();
+    const auto spend = [&](const Aabb& box) {
+      const Range r = cells(box);
+      const std::size_t work = std::size_t{r.c1 - r.c0 + 1} * (r.r1 - r.r0 + 1);
+      if (work > budget || context.stopped()) return false;
+      budget -= work;
+      return true;
+    };
+    for (const std::uint32_t t : piece_.triangles) {
+      if (!spend(box_of(soup_.triangles[t]))) return std::nullopt;
       add(soup_.triangles[t]);
+    }
     for (std::size_t i = 0, end = 0; i < piece_.sides.size(); i = end)
-      if (edge_flaw(piece_, i, end) != EdgeFlaw::kNone)
+      if (edge_flaw(piece_, i, end) != EdgeFlaw::kNone) {
+        Aabb box;
+        box.add(soup_.corners[piece_.sides[i].lo]);
+        box.add(soup_.corners[piece_.sides[i].hi]);
+        if (!spend(box)) return std::nullopt;
         spoil(soup_.corners[piece_.sides[i].lo], soup_.corners[piece_.sides[i].hi]);
+      }
     const double whole = field_.step.x * field_.step.y * (1 + 2 * kBorder) * (1 + 2 * kBorder);
     field_.heights.resize(least_.size());
     for (std::size_t i = 0; i < least_.size(); ++i) {
@@ -246,7 +264,12 @@ std::optional<Terrain> find_terrain(const Scene& scene, double cell_m, const Con
       context.say("no terrain at " + name() + ": it is flat and would hide nothing");
       continue;
     }
-    Terrain terrain{Raster(soup, piece, cell_m).field(), {}};
+    auto field = Raster(soup, piece, cell_m).field(context);
+    if (!field) {
+      context.say("no terrain at " + name() + ": its triangles lie over each other many times");
+      continue;
+    }
+    Terrain terrain{std::move(*field), {}};
     if (buried(scene, terrain.field) > sources(scene).size() / kBuriedIn) {
       context.say("no terrain at " + name() + ": objects lie wholly below it, it may be a ceiling");
       continue;
@@ -315,6 +338,19 @@ std::vector<std::uint32_t> add_height_field(const Scene& scene, OccluderSet& set
   const Vec3 e = grown.half_extents();
   auto terrain = find_terrain(scene, std::min(e.x, e.z), context);
   if (!terrain) return {};
+  // Under the ground no viewpoint counts: where somebody says that observers are, there is none.
+  for (const Vec3& seed : set.view_space.seeds) {
+    const Vec2 at = (ground(seed) - terrain->field.origin) / terrain->field.step;
+    if (!(at.x >= 0 && at.y >= 0 && at.x < terrain->field.columns && at.y < terrain->field.rows))
+      continue;
+    const std::size_t cell =
+        static_cast<std::size_t>(at.y) * terrain->field.columns + static_cast<std::size_t>(at.x);
+    if (static_cast<double>(terrain->field.heights[cell]) > seed.y) {
+      context.say("no terrain: observers are below it, at " + std::to_string(seed.x) + "," +
+                  std::to_string(seed.y) + "," + std::to_string(seed.z));
+      return {};
+    }
+  }
   set.height_field = erode(terrain->field, grown, set.slack_m);
   const auto left = std::count_if(set.height_field.heights.begin(), set.height_field.heights.end(),
                                   [](float h) { return h != HeightField::kNone; });

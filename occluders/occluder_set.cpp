@@ -89,6 +89,13 @@ Status check_numbers(const OccluderSet& set) {
       for (const Prism& prism : level)
         if (const std::string why = check_prism(prism); !why.empty())
           return invalid_argument("occluders: prism of a piece: " + why);
+  for (const auto* ladder : {&set.margins_m, &set.sheet_radii_m})
+    for (std::size_t i = 0; i < ladder->size(); ++i)
+      if (!((*ladder)[i] >= (i == 0 ? 0 : (*ladder)[i - 1]) && in_range((*ladder)[i])))
+        return wrong("margin or radius", (*ladder)[i], "0 to 1e9, ascending");
+  if (set.height_field.heights.size() !=
+      std::size_t{set.height_field.columns} * set.height_field.rows)
+    return invalid_argument("occluders: the height field has not as many heights as cells");
   const auto outside = [](const Vec3& p) {
     return !in_range(p.x) || !in_range(p.y) || !in_range(p.z);
   };
@@ -101,7 +108,9 @@ Status check_numbers(const OccluderSet& set) {
   };
   for (const SolidPiece& piece : set.solid_pieces)
     if (piece.levels.size() > set.margins_m.size() ||
-        std::any_of(piece.levels.begin(), piece.levels.end(), bad_mesh))
+        std::any_of(piece.levels.begin(), piece.levels.end(), bad_mesh) ||
+        piece.floored_levels.size() > set.margins_m.size() ||
+        std::any_of(piece.floored_levels.begin(), piece.floored_levels.end(), bad_mesh))
       return invalid_argument("occluders: a solid piece has a number out of range");
   for (const PrismPiece& piece : set.prism_pieces)
     if (piece.levels.size() > set.margins_m.size())

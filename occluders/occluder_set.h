@@ -68,8 +68,10 @@ struct PrismPiece {
 };
 struct SolidPiece {
   std::vector<FaceMesh> levels;  ///< closed meshes
-  /// The piece may be drawn for cells that lie wholly within these half-spaces only.
+  /// For cells that lie wholly within all of `floors`, half-spaces: closed meshes that lose nothing
+  /// at those planes, since nothing in the scene lies beyond. Both empty, or neither.
   std::vector<ConvexSolid::Plane> floors;
+  std::vector<FaceMesh> floored_levels;
 };
 
 /// Part of a plane in which nothing but opaque matter lies, shrunk within the plane by every radius

@@ -63,6 +63,7 @@ HWY_INLINE bool block_reaches(const std::int16_t* columns, std::int16_t q) {
 struct Setup {
   alignas(64) float p[3][4][kW];
   alignas(64) float edge[3][4][kW];
+  alignas(64) float guard[4][kW];  ///< what an edge plane's value may be off by, in any direction
   alignas(64) float g[3][kW];
   std::uint32_t front = 0;
 };
@@ -98,6 +99,9 @@ HWY_INLINE void set_up(const FaceBatch& batch, const float* eye, float k, Setup&
       V along[3];
       for (int a = 0; a < 3; ++a)
         along[a] = hn::Sub(p[a][e], p[a][c]);
+      // Each component is a difference of two rounded products of the edge and a corner's distance.
+      const V length = hn::Add(hn::Add(hn::Abs(along[0]), hn::Abs(along[1])), hn::Abs(along[2]));
+      hn::Store(hn::Mul(hn::Mul(length, size), hn::Set(d, kEdgeGuard)), d, out.guard[c] + l);
       for (int a = 0; a < 3; ++a) {
         const int b = (a + 1) % 3;
         const int f = (a + 2) % 3;
@@ -390,7 +394,8 @@ HWY_INLINE bool make_raster(const Setup& s, std::uint32_t lane, std::uint32_t si
   for (int c = 0; c < 4; ++c) {
     const float eu = s.edge[u][c][lane];
     const float ev = s.edge[v][c][lane];
-    const float ew = sign * s.edge[w][c][lane];
+    // On the face |u|, |v| <= 1: the guard moves the edge inwards by more than its rounding.
+    const float ew = sign * s.edge[w][c][lane] - s.guard[c][lane];
     if (std::abs(eu) <= 1e-6F * (std::abs(ev) + std::abs(ew))) {
       if (ev == 0 && ew == 0) continue;  // a repeated corner
       r.row_slope[r.rows] = ev * step;

@@ -45,18 +45,24 @@ class Maker {
   void add_solid(const SolidPiece& piece) {
     OccluderPieces::Piece p;
     begin(p);
+    const std::size_t count = std::max(piece.levels.size(), piece.floored_levels.size());
     p.first_floor = static_cast<std::uint32_t>(out_.floors.size());
     p.floors = static_cast<std::uint32_t>(piece.floors.size());
     for (ConvexSolid::Plane plane : piece.floors) {
       plane.offset -= glm::dot(plane.normal, out_.origin);
       out_.floors.push_back(plane);
     }
-    for (const FaceMesh& mesh : piece.levels) {
-      open_level();
-      add_mesh(mesh);
-    }
-    p.levels = static_cast<std::uint32_t>(piece.levels.size());
-    p.first_real_level = p.first_level;
+    const auto add = [&](const std::vector<FaceMesh>& levels) {
+      const auto first = static_cast<std::uint32_t>(out_.levels.size());
+      for (std::size_t k = 0; k < count; ++k) {
+        open_level();
+        if (k < levels.size()) add_mesh(levels[k]);
+      }
+      return first;
+    };
+    p.first_real_level = add(piece.levels);
+    p.first_level = piece.floors.empty() ? p.first_real_level : add(piece.floored_levels);
+    p.levels = static_cast<std::uint32_t>(count);
     end(p);
   }
 

@@ -55,18 +55,16 @@ PieceChoice choose_level(const OccluderPieces& pieces, const OccluderPieces::Pie
     if (a <= 1.001 * cell.radius || a <= 1.001 * e) return {};
     double r = (cell.radius + e) * std::sqrt(across) / (a - e) * (1 + 1e-6);
     if (!guards.sheet_obliqueness) r = cell.radius + e;
-    while (level < piece.levels && pieces.sheet_radii_m[level] < r)
+    while (level < piece.levels && !(pieces.sheet_radii_m[level] >= r))
       ++level;
   } else {
-    for (std::uint32_t f = piece.first_floor; f < piece.first_floor + piece.floors; ++f) {
-      const ConvexSolid::Plane& floor = pieces.floors[f];
-      if (glm::dot(floor.normal, cell.eye) + cell.reach.support(floor.normal) > floor.offset) return {};
-    }
-    const double m = margin.at(std::max(far[0], far[2]));
+    // A prism drawn far down may be deep on the faces that look down, where it hides little.
+    const bool drawn_down = piece.kind != OccluderPieces::Kind::kSolid;
+    const double m = margin.at(
+        std::max({far[0], far[2], drawn_down || (sides & ~kHorizontalSides) == 0 ? 0.0 : far[1]}));
     if (guards.pixel_margin)
-      while (level < piece.levels && pieces.margins_m[level] < m)
+      while (level < piece.levels && !(pieces.margins_m[level] >= m))
         ++level;
-    // A prism drawn far down may be deeper on the faces that look down than the margin allows.
     if (level < piece.levels && guards.pixel_margin && pieces.margins_m[level] < margin.at(far[1]))
       sides &= kHorizontalSides;
   }
@@ -75,6 +73,11 @@ PieceChoice choose_level(const OccluderPieces& pieces, const OccluderPieces::Pie
   if ((piece.kind == OccluderPieces::Kind::kFloored && !cell.above_floor) ||
       (piece.kind == OccluderPieces::Kind::kGrounded && !cell.on_ground))
     first = piece.first_real_level;
+  for (std::uint32_t f = piece.first_floor; f < piece.first_floor + piece.floors; ++f) {
+    const ConvexSolid::Plane& floor = pieces.floors[f];
+    if (!(glm::dot(floor.normal, cell.eye) + cell.reach.support(floor.normal) <= floor.offset))
+      first = piece.first_real_level;
+  }
   if (pieces.levels[first + level].batches == 0) return {};
   return {first + level, sides};
 }

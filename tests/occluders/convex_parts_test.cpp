@@ -60,6 +60,16 @@ TEST(ConvexParts, CoverRandomStars) {
   }
 }
 
+TEST(ConvexParts, GiveUpOnRingsThatCrossEverywhere) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> place(-10, 10);
+  std::vector<Vec2> ring(3000);
+  for (Vec2& p : ring)
+    p = {place(random), place(random)};
+  EXPECT_TRUE(convex_parts(Polygon{{ring}}).empty());
+  EXPECT_TRUE(convex_parts(Polygon{{std::vector<Vec2>(30000, Vec2{1, 2})}}).empty());
+}
+
 TEST(MeshOfPrism, IsClosedAndFacesOutwards) {
   const Prism prism{{{{{0, 0}, {4, 0}, {4, 1}, {1, 1}, {1, 4}, {0, 4}}}}, 2, 5, 0, false};
   const FaceMesh mesh = mesh_of(prism);

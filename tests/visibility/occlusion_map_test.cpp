@@ -102,7 +102,8 @@ TEST(OcclusionMap, APlaneBeyondWhichNothingLiesLosesNothingToTheReach) {
   for (const bool something_below : {false, true}) {
     SceneBuilder b;
     b.add_box({10, 0, -30}, {16, 20, 30});
-    const ObjectId low = b.add_box({30, 0, -1}, {31, 0.3, 1}, OccluderTag::kNever);
+    b.add_box({-60, 0, -20}, {-50, 10, 20});
+    const ObjectId low = b.add_box({30, 0.2, 0}, {30.2, 0.4, 0.2}, OccluderTag::kNever);
     if (something_below) b.add_box({30, -1, 5}, {31, -0.5, 6}, OccluderTag::kNever);
     const Scene upright = std::move(b).finish();
     Scene scene;
@@ -113,9 +114,11 @@ TEST(OcclusionMap, APlaneBeyondWhichNothingLiesLosesNothingToTheReach) {
       scene.objects.push_back(o);
     }
     ASSERT_TRUE(finish_scene(scene));
-    const Reach reach = Reach::ball(1);
+    const Reach reach = Reach::ball(0.3);
     const OccluderSet set = shrunk(scene, reach);
-    const Pvs pvs = solved(scene, set, {Vec3(turn * glm::dvec4(0, 1.7, 0, 1)), reach});
+    const Pvs pvs = solved(scene, set, {Vec3(turn * glm::dvec4(0, 0.4, 0, 1)), reach});
+    ASSERT_EQ(set.solid_pieces.size(), 2U);
+    EXPECT_EQ(set.solid_pieces[0].floors.size(), something_below ? 0U : 1U);
     // Shrunk at its base too, the block would let one look under it.
     EXPECT_EQ(lists(pvs, low), something_below);
     EXPECT_EQ(misses(Verifier(scene, &set, BlockerChoice::kOccluding), pvs), 0U);
