@@ -116,7 +116,7 @@ TEST(OcclusionMap, APlaneBeyondWhichNothingLiesLosesNothingToTheReach) {
     ASSERT_TRUE(finish_scene(scene));
     const Reach reach = Reach::ball(0.3);
     const OccluderSet set = shrunk(scene, reach);
-    const Pvs pvs = solved(scene, set, {Vec3(turn * glm::dvec4(0, 0.4, 0, 1)), reach});
+    const Pvs pvs = solved(scene, set, {Vec3(turn * glm::dvec4(0, 0.5, 0, 1)), reach});
     ASSERT_EQ(set.solid_pieces.size(), 2U);
     EXPECT_EQ(set.solid_pieces[0].floors.size(), something_below ? 0U : 1U);
     // Shrunk at its base too, the block would let one look under it.
