@@ -1,13 +1,13 @@
 #include "visibility/cull_map.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <numeric>
 
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+
+#include "visibility/answer.h"
 
 
 namespace ivis {
@@ -139,26 +139,20 @@ Result<Pvs> CullMap::solve(const ViewCell& cell) const {
 }
 
 Result<Pvs> CullMap::solve(const ViewCell& cell, Stats& stats) const {
-  if (!std::isfinite(cell.eye.x) || !std::isfinite(cell.eye.y) || !std::isfinite(cell.eye.z))
-    return invalid_argument("the eye is not finite");
-  if (!serves(occluders_, cell.reach))
-    return invalid_argument("reach " + cell.reach.to_string() + " is larger than the occluders were shrunk for, " +
-                            occluders_.reach.to_string());
-  Pvs pvs;
-  pvs.cell = cell;
-  pvs.scene_hash = scene_.hash;
+  if (auto checked = check_cell(cell, occluders_); !checked) return checked.error();
+  Pvs pvs = empty_answer(scene_, cell);
   const Vec3 half = padded(cell.reach, occluders_.slack_m).half_extents();
   Eye eye;
   eye.apex = cell.eye + Vec3{0, half.y, 0} - origin_;
   for (int i = 0; i < 3; ++i) eye.single[i] = static_cast<float>(eye.apex[i]);
+  const char* why = nullptr;
   if (solids_.holds(cell.eye)) {
-    pvs.everything_because = "eye inside an occluder";
+    why = "eye inside an occluder";
   } else if (!eye_fits_single_precision(eye.apex, occluders_.slack_m)) {
-    pvs.everything_because = "eye too far from the scene for single precision";
+    why = "eye too far from the scene for single precision";
   }
-  if (!pvs.everything_because.empty()) {
-    pvs.objects.resize(scene_.objects.size());
-    std::iota(pvs.objects.begin(), pvs.objects.end(), 0U);
+  if (why != nullptr) {
+    list_everything(scene_, why, pvs);
     return pvs;
   }
   const Aabb box{cell.eye - half, cell.eye + half};
@@ -178,15 +172,7 @@ Result<Pvs> CullMap::solve(const ViewCell& cell, Stats& stats) const {
   } else {
     find_polar(eye, *scratch, stats);
   }
-  // Ascending ids by way of a bit set: cheaper than sorting, and the same for any number of threads.
-  auto& bits = scratch->bits;
-  bits.assign((scene_.objects.size() + 63) / 64, 0);
-  for (const std::uint32_t id : scratch->visible) bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
-  for (const ObjectId id : always_visible_) bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
-  pvs.objects.reserve(scratch->visible.size() + always_visible_.size());
-  for (std::size_t w = 0; w < bits.size(); ++w)
-    for (std::uint64_t m = bits[w]; m != 0; m &= m - 1)
-      pvs.objects.push_back(static_cast<ObjectId>(w * 64 + static_cast<std::size_t>(std::countr_zero(m))));
+  list_ascending(scene_.objects.size(), scratch->visible, always_visible_, scratch->bits, pvs);
   give_back(std::move(scratch));
   return pvs;
 }

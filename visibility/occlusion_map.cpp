@@ -1,7 +1,6 @@
 #include "visibility/occlusion_map.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numbers>
 
