@@ -74,6 +74,7 @@ struct Subject {
   Subject(std::string n, Scene s, const Reach& reach) : name(std::move(n)), scene(std::move(s)) {
     ShrinkOptions options;
     options.reach = reach;
+    options.margins = false;
     occluders = get(shrink(scene, options, FastEroder{})).set;
     map = std::make_unique<CullMap>(scene, occluders, MethodOptions{});
   }

@@ -358,6 +358,8 @@ bool SceneSupport::within(const Vec3& normal, double offset) const {
   for (const auto* list : {&scene_.objects, &scene_.hidden_solids})
     for (const Object& o : *list) {
       if (o.always_visible) continue;  // listed whatever hides it
+      const Vec3 far = glm::mix(o.bounds.lo, o.bounds.hi, glm::greaterThan(normal, Vec3(0)));
+      if (glm::dot(normal, far) <= most) continue;  // no corner of its box is farther
       const Mesh& mesh = scene_.mesh_of(o);
       for (const auto& p : mesh.positions)
         most = std::max(most, glm::dot(normal, Vec3(o.to_world * glm::dvec4(Vec3(p), 1.0))));

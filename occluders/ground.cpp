@@ -46,12 +46,12 @@ std::string flaw(const Soup& soup, const Piece& piece) {
     const EdgeFlaw wrong = edge_flaw(piece, i, end);
     const Vec3& a = soup.corners[piece.sides[i].lo];
     const Vec3& b = soup.corners[piece.sides[i].hi];
-    const std::string edge = "the edge " + place(a) + " - " + place(b);
+    const auto edge = [&] { return "the edge " + place(a) + " - " + place(b); };
     if (wrong == EdgeFlaw::kMany)
-      return edge + " belongs to " + std::to_string(end - i) + " triangles";
-    if (wrong == EdgeFlaw::kFold) return "it folds over itself at " + edge;
+      return edge() + " belongs to " + std::to_string(end - i) + " triangles";
+    if (wrong == EdgeFlaw::kFold) return "it folds over itself at " + edge();
     if (wrong == EdgeFlaw::kOpen && !on_border(a, b))
-      return edge + " is open inside (a hole, a crack or a T-junction)";
+      return edge() + " is open inside (a hole, a crack or a T-junction)";
     i = end;
   }
   const Vec3 size = piece.box.size();

@@ -6,7 +6,9 @@
 #include <map>
 
 #include "occluders/clip.h"
+#include "occluders/distance_check.h"
 #include "occluders/gate.h"
+#include "occluders/inset.h"
 #include "occluders/progress.h"
 
 namespace ivis {
@@ -27,12 +29,20 @@ Aabb bounds_of(const std::vector<Polygon>& region) {
 std::vector<Polygon> within(const Polygon& polygon, const Vec2& lo, const Vec2& hi) {
   const Aabb b = bounds_of({polygon});
   if (b.lo.x >= lo.x && b.hi.x <= hi.x && b.lo.z >= lo.y && b.hi.z <= hi.y) return {polygon};
-  const Vec2 far_lo{std::min(b.lo.x, lo.x) - 1, std::min(b.lo.z, lo.y) - 1};
-  const Vec2 far_hi{std::max(b.hi.x, hi.x) + 1, std::max(b.hi.z, hi.y) + 1};
-  const auto box = [](const Vec2& p, const Vec2& q) { return Ring{p, {q.x, p.y}, q, {p.x, q.y}}; };
-  return subtract(polygon.rings, Fill::kEvenOdd,
-                  {box(far_lo, {lo.x, far_hi.y}), box({hi.x, far_lo.y}, far_hi),
-                   box(far_lo, {far_hi.x, lo.y}), box({far_lo.x, hi.y}, far_hi)});
+  return intersect(polygon.rings, Fill::kEvenOdd, {lo, {hi.x, lo.y}, hi, {lo.x, hi.y}});
+}
+
+/// E(polygon, B(step)) or a little less: its mitred outline where that will do, in a tenth of the
+/// time.
+std::vector<Polygon> next_margin(const Polygon& polygon, double step, const Eroder& eroder,
+                                 std::size_t& failed) {
+  const Reach disc = Reach::disc(step);
+  auto mitred = inset(polygon, step);
+  if (!mitred || !within_erosion(*mitred, polygon, disc))
+    return gated_erosion(polygon, disc, eroder, kMinAreaM2, failed);
+  std::vector<Polygon> out;
+  if (!mitred->empty() && area(*mitred) >= kMinAreaM2) out.push_back(std::move(*mitred));
+  return out;
 }
 
 /// One stack's parts by grid cell.
@@ -73,7 +83,7 @@ std::vector<PrismPiece> pieces_of(const FusedStack& stack,
       std::vector<Polygon> eroded;
       if (step == 0) eroded = left;
       for (const Polygon& polygon : step == 0 ? std::vector<Polygon>{} : left)
-        for (Polygon& piece : gated_erosion(polygon, Reach::disc(step), eroder, kMinAreaM2, failed))
+        for (Polygon& piece : next_margin(polygon, step, eroder, failed))
           eroded.push_back(std::move(piece));
       for (const Polygon& polygon : eroded) {
         const Prism whole_prism{{}, std::min(raised, top), top, stack.bottom, stack.grounded};

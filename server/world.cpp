@@ -10,9 +10,11 @@
 namespace ivis::server {
 namespace {
 
-Result<OccluderSet> shrink_here(const Scene& scene, const Reach& reach, const Context& context) {
+Result<OccluderSet> shrink_here(const Scene& scene, const Reach& reach, const std::string& method,
+                                const Context& context) {
   ShrinkOptions options;
   options.reach = reach;
+  options.margins = method == "occlusion-map";  // nothing else draws them
   const FastEroder eroder;
   auto shrunk = shrink(scene, options, eroder, context);
   if (!shrunk) return shrunk.error();
@@ -42,9 +44,15 @@ Result<std::unique_ptr<World>> load_world(const WorldOptions& options, const Con
   if (!reach) return reach.error();
   world->reach = *reach;
 
+  std::string method = options.method;
+  if (method.empty()) {
+    const auto list = method_list();
+    IVIS_ASSERT(!list.empty(), "at least one method is registered");
+    method = list.front().name;
+  }
   if (options.occluders.empty()) {
     context.say("shrinking occluders by " + text);
-    auto set = shrink_here(world->scene, world->reach, context);
+    auto set = shrink_here(world->scene, world->reach, method, context);
     if (!set) return set.error();
     world->occluders = std::move(*set);
   } else if (auto fits = check_occluders(world->occluders, world->scene.hash, world->reach,
@@ -53,12 +61,6 @@ Result<std::unique_ptr<World>> load_world(const WorldOptions& options, const Con
     return fits.error();
   }
 
-  std::string method = options.method;
-  if (method.empty()) {
-    const auto list = method_list();
-    IVIS_ASSERT(!list.empty(), "at least one method is registered");
-    method = list.front().name;
-  }
   MethodOptions method_options;
   method_options.threads = options.threads;
   auto made = make_method(method, world->scene, world->occluders, method_options);
