@@ -19,7 +19,8 @@ function(ivis_target target)
     -ffp-contract=off)  # the same bits from every SIMD target
   if(IVIS_SANITIZE)
     target_compile_options(${target} PRIVATE -fsanitize=${IVIS_SANITIZE} -fno-omit-frame-pointer
-      -fno-sanitize-recover=all -O1)
+      -fno-sanitize-recover=all -O1
+      -g1 -fno-var-tracking -fno-var-tracking-assignments)  # lines in reports; full -g takes gcc twice as long
     target_link_options(${target} PUBLIC -fsanitize=${IVIS_SANITIZE})
   endif()
 endfunction()

@@ -3,14 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "core/reach.h"
 
 namespace ivis {
 
 /// Slack of every containment test between a client's pose and the cell its PVS was solved for.
-/// Occluders are shrunk by the reach grown by these, so that a pose this far outside is still served.
-/// A flat disc stands on streets that are not: its vertical slack is larger.
+/// Occluders are shrunk by the reach grown by these, so that a pose this far outside is still
+/// served. A flat disc stands on streets that are not: its vertical slack is larger.
 inline constexpr double kReachToleranceM = 0.001;
 inline constexpr double kDiscVerticalToleranceM = 0.01;
 inline double vertical_tolerance(const Reach& r) {
@@ -33,15 +34,17 @@ inline bool serves(const Reach& shrunk_for, double slack_m, const Reach& wanted)
 /// `slack_m` of error besides (an upright cylinder's, as padded() takes it). Less than that of
 /// padded(), as a ball stays round here.
 inline double largest_move(const Reach& r, double slack_m) {
-  const Vec3 e =
-      r.half_extents() + Vec3{kReachToleranceM, vertical_tolerance(r), kReachToleranceM};
+  const Vec3 e = r.half_extents() + Vec3{kReachToleranceM, vertical_tolerance(r), kReachToleranceM};
   const double slack = std::numbers::sqrt2 * slack_m;
   switch (r.kind()) {
     case Reach::Kind::kBall:
-    case Reach::Kind::kEllipsoid: return slack + std::max({e.x, e.y, e.z});
+    case Reach::Kind::kEllipsoid:
+      return slack + std::max({e.x, e.y, e.z});
     case Reach::Kind::kDisc:
-    case Reach::Kind::kCylinder: return slack + std::hypot(e.x, e.y);
-    case Reach::Kind::kBox: break;
+    case Reach::Kind::kCylinder:
+      return slack + std::hypot(e.x, e.y);
+    case Reach::Kind::kBox:
+      break;
   }
   return slack + glm::length(e);
 }
@@ -56,5 +59,10 @@ struct ViewCell {
     return reach.contains(p - eye, kReachToleranceM, vertical_tolerance(reach));
   }
 };
+
+/// A cell for an observer of several eyes (stereo, multi-projection), any of which may move by
+/// `reach`: one solution for all of them. Its centre is the middle of their box; its reach holds
+/// every eye's. At least one eye.
+ViewCell cover(std::span<const Vec3> eyes, const Reach& reach);
 
 }  // namespace ivis

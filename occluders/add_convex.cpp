@@ -43,7 +43,8 @@ bool sheets_promise_gain(const std::vector<ConvexPiece>& pieces, const ViewSpace
 Status add_convex_and_sheets(const Scene& scene, const std::vector<const Object*>& objects,
                              const std::vector<bool>& skip, const ShrinkOptions& options,
                              const Context& context, std::vector<ObjectSolids>& prisms,
-                             OccluderSet& set, ShrinkReport& report) {
+                             OccluderSet& set, ShrinkReport& report,
+                             std::vector<ObjectFate>& fates) {
   const bool maybe_sheets =
       options.sheets == SheetUse::kOn ||
       (options.sheets == SheetUse::kAuto &&
@@ -62,6 +63,7 @@ Status add_convex_and_sheets(const Scene& scene, const std::vector<const Object*
   const Reach reach = padded(options.reach, set.slack_m);
   std::vector<ConvexPiece> pieces;
   std::vector<ConvexSolid> odd;
+  std::vector<std::size_t> odd_of;  // index into objects
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (!found[i].pieces.empty() && found[i].left_out.empty()) {
       prisms[i].left_out.erase("open mesh");
@@ -78,6 +80,7 @@ Status add_convex_and_sheets(const Scene& scene, const std::vector<const Object*
                 std::to_string(objects[i]->node) + (name.empty() ? "" : " '" + name + "'"));
           }
         odd.push_back(piece.solid);
+        odd_of.push_back(i);
       }
       pieces.push_back(std::move(piece));
     }
@@ -90,6 +93,14 @@ Status add_convex_and_sheets(const Scene& scene, const std::vector<const Object*
       shrunk[k] = shrink_convex(odd[k], reach, set.margins_m, &support, floor);
     });
   }
+  if (!fates.empty())
+    for (std::size_t k = 0; k < odd.size(); ++k) {
+      ObjectFate& fate = fates[odd_of[k]];
+      ++fate.convex;
+      // Until a part is seen to be left; what the prisms leave is told later.
+      fate.vanished = (fate.convex == 1 || fate.vanished) && shrunk[k].levels.empty() &&
+                      shrunk[k].floored_levels.empty();
+    }
   for (SolidPiece& piece : shrunk)
     if (!piece.levels.empty() || !piece.floored_levels.empty())
       set.solid_pieces.push_back(std::move(piece));

@@ -173,8 +173,10 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
     });
   }
   if (context.stopped()) return cancelled();
+  std::vector<ObjectFate>& fates = report.objects;
+  if (options.fates) fates.resize(objects.size());
   if (Status s = add_convex_and_sheets(scene, objects, is_ground, options, context, found, set,
-                                       report);
+                                       report, fates);
       !s)
     return s.error();
 
@@ -191,8 +193,14 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
           return invalid_argument("view space seed " + std::to_string(s) + " (" + text(seed) +
                                   ") lies inside the solid of " + describe(scene, *objects[i]));
       }
+      if (options.fates) ++fates[i].prisms;
       set.solids.push_back(std::move(p));
     }
+    if (!options.fates) continue;
+    fates[i].object = objects[i];
+    fates[i].ground = is_ground[i];
+    fates[i].volume = found[i].volume;
+    fates[i].left_out = std::move(found[i].left_out);
   }
 
   const std::vector<FusedStack> stacks = fuse(set.solids, set.floor, {}, context);
@@ -219,6 +227,7 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
     eroded.push_back(std::move(s.eroded));
   }
   report.occluders_out = set.shrunk.size();
+  if (options.fates) find_vanished(set, fates);
 
   if (options.margins) {
     const std::size_t failed = add_prism_ladder(stacks, eroded, grown, eroder, {}, set, context);

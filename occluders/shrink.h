@@ -3,9 +3,11 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/context.h"
 #include "core/result.h"
+#include "occluders/fates.h"
 #include "occluders/occluder_set.h"
 #include "occluders/voxel_solids.h"
 #include "scenes/scene.h"
@@ -24,7 +26,9 @@ class Eroder {
 };
 
 struct ShrinkReport {
-  std::size_t occluders_in = 0;                 ///< objects considered
+  std::vector<ObjectFate>
+      objects;                   ///< when ShrinkOptions::fates asked for them; in the scene's order
+  std::size_t occluders_in = 0;  ///< objects considered
   std::size_t occluders_out = 0;                ///< shrunk prisms
   std::map<std::string, std::size_t> left_out;  ///< reason -> objects (or pieces)
   std::size_t convex_solids = 0;                ///< that are no upright prisms
@@ -33,15 +37,15 @@ struct ShrinkReport {
   std::size_t sheet_tiles = 0;
   std::size_t sheet_faces = 0;  ///< of all levels
   double sheet_seconds = 0;
-  double solid_volume = 0;                      ///< cubic metres, real solids, without extensions
-  double kept_volume = 0;                       ///< of the shrunk prisms, without extensions
+  double solid_volume = 0;  ///< cubic metres, real solids, without extensions
+  double kept_volume = 0;   ///< of the shrunk prisms, without extensions
   double seconds = 0;
   std::optional<VoxelReport> voxels;  ///< when ShrinkOptions::voxel_m asked for them
   double volume_kept() const { return solid_volume > 0 ? kept_volume / solid_volume : 0; }
 };
 
-/// kAuto: where they promise gain: observers are inside, or most convex solids are marked `only` and
-/// many of them are no upright prisms.
+/// kAuto: where they promise gain: observers are inside, or most convex solids are marked `only`
+/// and many of them are no upright prisms.
 enum class SheetUse : std::uint8_t { kAuto, kOff, kOn };
 
 struct ShrinkOptions {
@@ -51,6 +55,7 @@ struct ShrinkOptions {
   bool margins = true;
   std::vector<double> margins_m{};  ///< empty: default_margins() of the reach
   SheetUse sheets = SheetUse::kAuto;
+  bool fates = false;  ///< also tell what became of each object
   double voxel_m = 0;  ///< side of the voxels of general solids (voxel_solids.h); 0: none
 };
 

@@ -17,6 +17,7 @@
 
 #include "occluders/fast_erosion.h"
 #include "occluders/file.h"
+#include "visibility/frustum_cull.h"
 #ifdef IVIS_HAVE_GL
 #include "visibility/gl/gl_occlusion_map.h"
 #endif
@@ -116,7 +117,7 @@ Result<Scene> SceneArgs::load(const Context& context) const {
 }
 
 void ViewSpaceArgs::add_to(CLI::App& app) {
-  auto* inside_option = app.add_option("--inside", inside, "a point X,Y,Z where observers are; may be given again")->type_name("X,Y,Z");
+  auto* inside_option = app.add_option("--inside", inside, "a point X,Y,Z where observers are; may be given again")->type_name("X,Y,Z")->allow_extra_args(false);
   auto* path_option = app.add_option("--path", path, "CSV of poses (columns x,y,z) where observers are");
   auto* outside_option = app.add_flag("--outside", outside, "observers are outside every solid (default)");
   inside_option->excludes(path_option)->excludes(outside_option);
@@ -168,6 +169,10 @@ void SolveArgs::add_to(CLI::App& app, bool reach_required) {
         if (!wrong.empty()) return wrong;
         return std::stod(text) == 16 * std::floor(std::stod(text) / 16) ? "" : "'" + text + "' is not a multiple of 16";
       }, "PIXELS");
+  app.add_option("--frustum", frustum,
+                 "list only what can be in the picture: yaw,pitch,fov_x,fov_y,turn in degrees; yaw 0 looks along +X, 90 along -Z; full "
+                 "angles of view; turn: how far the view may turn while an answer is in use")
+      ->type_name("YAW,PITCH,FOV_X,FOV_Y,TURN");
   app.add_option("--reference-rays", rays, "aimed rays an object of the method 'reference'")->capture_default_str()->check(CLI::Range(1, 1000000));
 }
 
@@ -211,6 +216,13 @@ Status check_output_folder(const std::filesystem::path& folder) {
 
 Result<Reach> SolveArgs::parse_reach() const { return Reach::parse(reach); }
 
+Result<std::optional<Frustum>> SolveArgs::parse_frustum() const {
+  if (frustum.empty()) return std::optional<Frustum>();
+  const auto parsed = Frustum::parse(frustum);
+  if (!parsed) return parsed.error();
+  return std::optional<Frustum>(*parsed);
+}
+
 Status SolveArgs::check_files() const {
   return occluders.empty() ? ok() : check_input_file(occluders);
 }
@@ -251,6 +263,8 @@ Result<std::unique_ptr<Method>> SolveArgs::make(const Scene& scene, const Occlud
 Result<std::unique_ptr<Prepared>> prepare(const SceneArgs& scene, const SolveArgs& solve,
                                           const Reach& reach, const Context& context) {
   if (auto s = solve.check_files(); !s) return s.error();
+  const auto frustum = solve.parse_frustum();
+  if (!frustum) return frustum.error();
   auto prepared = std::make_unique<Prepared>();
   auto loaded = scene.load(context);
   if (!loaded) return loaded.error();
@@ -261,6 +275,8 @@ Result<std::unique_ptr<Prepared>> prepare(const SceneArgs& scene, const SolveArg
   auto method = solve.make(prepared->scene, prepared->occluders, context);
   if (!method) return method.error();
   prepared->method = std::move(*method);
+  if (*frustum)
+    prepared->method = cull_by_frustum(std::move(prepared->method), prepared->scene, **frustum);
   return prepared;
 }
 

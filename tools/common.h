@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/context.h"
+#include "core/frustum.h"
 #include "core/path.h"
 #include "core/reach.h"
 #include "core/result.h"
@@ -80,8 +81,11 @@ struct SolveArgs {
   std::size_t max_occluders = 0;
   std::uint32_t map_pixels = MethodOptions{}.map_pixels;
   std::size_t rays = 256;
+  std::string frustum;
   void add_to(CLI::App& app, bool reach_required);
   Result<Reach> parse_reach() const;
+  /// None when not asked for.
+  Result<std::optional<Frustum>> parse_frustum() const;
   /// Of what needs no scene. Errors: kIo.
   Status check_files() const;
   /// The occluder file, or the scene shrunk here and now by the fast builder.

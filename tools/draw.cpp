@@ -6,53 +6,17 @@
 #include <sstream>
 
 #include "tools/common.h"
+#include "tools/picture.h"
 
 namespace ivis::tool {
 namespace {
 
-struct Args {
+struct DrawArgs {
   SceneArgs scene;
   SolveArgs solve;
   std::string eye;
   std::filesystem::path out;
   double radius = 250;
-};
-
-constexpr double kPixels = 1200;
-
-class Picture {
- public:
-  Picture(const Vec2& centre, double radius) : centre_(centre), radius_(radius) {
-    svg_ << std::fixed;
-    svg_.precision(1);
-  }
-  bool sees(const Aabb& b) const {
-    return b.hi.x >= centre_.x - radius_ && b.lo.x <= centre_.x + radius_ && b.hi.z >= centre_.y - radius_ && b.lo.z <= centre_.y + radius_;
-  }
-  void point(const Vec2& p) { svg_ << (p.x - centre_.x + radius_) * scale() << ',' << (p.y - centre_.y + radius_) * scale() << ' '; }
-  double scale() const { return kPixels / (2 * radius_); }
-  void polygon(const Polygon& polygon, const std::string& style) {
-    svg_ << "<path fill-rule=\"evenodd\" " << style << " d=\"";
-    for (const auto& ring : polygon.rings) {
-      svg_ << 'M';
-      for (const Vec2& p : ring) point(p);
-      svg_ << 'Z';
-    }
-    svg_ << "\"/>\n";
-  }
-  void box(const Aabb& b, const std::string& style) {
-    const double least = 1.2 / scale();  // small things stay visible
-    const Vec3 c = b.centre();
-    const Vec3 h = glm::max(b.size() * 0.5, Vec3{least});
-    polygon({{{{c.x - h.x, c.z - h.z}, {c.x + h.x, c.z - h.z}, {c.x + h.x, c.z + h.z}, {c.x - h.x, c.z + h.z}}}}, style);
-  }
-  void raw(const std::string& text) { svg_ << text; }
-  std::string text() const { return svg_.str(); }
-
- private:
-  Vec2 centre_;
-  double radius_;
-  std::ostringstream svg_;
 };
 
 /// What lies before the first shrunk wall that rises above the eye, all round: the lit part of the ground plane.
@@ -94,7 +58,7 @@ Polygon lit(const OccluderSet& set, const Vec3& apex, double far) {
   return polygon;
 }
 
-Outcome run(const Args& args) {
+Outcome draw(const DrawArgs& args) {
   if (args.out.extension() != ".svg") return invalid_argument("'" + args.out.string() + "': pictures are SVG, expected a name that ends in .svg");
   const auto reach = args.solve.parse_reach();
   if (!reach) return reach.error();
@@ -153,13 +117,13 @@ Outcome run(const Args& args) {
 
 void add_draw(CLI::App& app, std::function<Outcome()>& action) {
   CLI::App* sub = app.add_subcommand("draw", "a picture (SVG) from above of one pose: occluders, shrunk occluders, shadow, PVS");
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<DrawArgs>();
   args->scene.add_to(*sub);
   args->solve.add_to(*sub, true);
   sub->add_option("--eye", args->eye, "the observer's eye")->required()->type_name("X,Y,Z");
   sub->add_option("-o,--output", args->out, "picture to write")->required()->type_name("OUT.svg");
   sub->add_option("--radius", args->radius, "metres shown each way from the eye")->capture_default_str()->check(number_within(1, 100000));
-  sub->callback([&action, args] { action = [args] { return run(*args); }; });
+  sub->callback([&action, args] { action = [args] { return draw(*args); }; });
 }
 
 }  // namespace ivis::tool

@@ -7,13 +7,13 @@
 namespace ivis::tool {
 namespace {
 
-struct Args {
+struct InfoArgs {
   SceneArgs scene;
   bool json = false;
   bool triangles = false;
 };
 
-Outcome info(const Args& args) {
+Outcome info(const InfoArgs& args) {
   const auto scene = args.scene.load(make_context(args.json));
   if (!scene) return scene.error();
   if (args.json) {
@@ -66,7 +66,7 @@ class WholeTriangles {
   std::vector<std::uint32_t> all_;
 };
 
-Outcome objects(const Args& args) {
+Outcome objects(const InfoArgs& args) {
   const auto scene = args.scene.load(make_context(args.json));
   if (!scene) return scene.error();
   if (!args.json) {
@@ -97,9 +97,9 @@ Outcome objects(const Args& args) {
   return kOk;
 }
 
-std::shared_ptr<Args> add(CLI::App& app, std::function<Outcome()>& action, const char* name, const char* help, Outcome (*run)(const Args&)) {
+std::shared_ptr<InfoArgs> add(CLI::App& app, std::function<Outcome()>& action, const char* name, const char* help, Outcome (*run)(const InfoArgs&)) {
   CLI::App* sub = app.add_subcommand(name, help);
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<InfoArgs>();
   args->scene.add_to(*sub);
   sub->add_flag("--json", args->json, "print JSON");
   sub->callback([&action, args, run] { action = [args, run] { return run(*args); }; });

@@ -8,10 +8,10 @@
 namespace ivis::tool {
 namespace {
 
-struct Args {
+struct PvsArgs {
   SceneArgs scene;
   SolveArgs solve;
-  std::string eye;
+  std::vector<std::string> eyes;
   std::filesystem::path path;
   std::filesystem::path dump;
   bool json = false;
@@ -33,7 +33,7 @@ Result<Timed> timed_solve(const Method& method, const ViewCell& cell) {
   return Timed{std::move(*pvs), cpu_ms, wall_ms.count()};
 }
 
-Outcome one_eye(const Args& args, const Scene& scene, const Method& method, const ViewCell& cell) {
+Outcome one_eye(const PvsArgs& args, const Scene& scene, const Method& method, const ViewCell& cell) {
   // Once to warm caches and take memory, once to time.
   if (auto warm = method.solve(cell); !warm) return warm.error();
   const auto t = timed_solve(method, cell);
@@ -59,7 +59,7 @@ std::string row_name(std::size_t row) {
   return std::string(digits.size() < 5 ? 5 - digits.size() : 0, '0') + digits + ".txt";
 }
 
-Outcome along_path(const Args& args, const std::vector<Pose>& path, const Scene& scene,
+Outcome along_path(const PvsArgs& args, const std::vector<Pose>& path, const Scene& scene,
                    const Method& method, const Reach& reach, const Context& context) {
   if (!args.dump.empty()) {
     std::error_code ec;
@@ -101,17 +101,19 @@ Outcome along_path(const Args& args, const std::vector<Pose>& path, const Scene&
   return kOk;
 }
 
-Outcome run(const Args& args) {
+Outcome run_pvs(const PvsArgs& args) {
   const auto reach = args.solve.parse_reach();
   if (!reach) return reach.error();
   ViewCell cell{{}, *reach};
-  if (!args.eye.empty()) {
-    const auto eye = parse_point(args.eye);
+  std::vector<Vec3> eyes;
+  for (const std::string& text : args.eyes) {
+    const auto eye = parse_point(text);
     if (!eye) return eye.error();
-    cell.eye = *eye;
+    eyes.push_back(*eye);
   }
+  if (!eyes.empty()) cell = cover(eyes, *reach);
   std::vector<Pose> path;
-  if (args.eye.empty()) {
+  if (eyes.empty()) {
     auto poses = read_path(args.path);
     if (!poses) return poses.error();
     path = std::move(*poses);
@@ -119,27 +121,27 @@ Outcome run(const Args& args) {
   if (!args.dump.empty())
     if (auto s = check_output_folder(args.dump); !s) return s.error();
   const Context context = make_context(args.json);
-  const auto prepared = prepare(args.scene, args.solve, *reach, context);
+  const auto prepared = prepare(args.scene, args.solve, cell.reach, context);
   if (!prepared) return prepared.error();
   const auto& [scene, occluders, method] = **prepared;
-  return args.eye.empty() ? along_path(args, path, scene, *method, *reach, context)
-                          : one_eye(args, scene, *method, cell);
+  return eyes.empty() ? along_path(args, path, scene, *method, *reach, context)
+                      : one_eye(args, scene, *method, cell);
 }
 
 }  // namespace
 
 void add_pvs(CLI::App& app, std::function<Outcome()>& action) {
   CLI::App* sub = app.add_subcommand("pvs", "the objects that can be seen from anywhere within reach of an eye, or of each pose of a path");
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<PvsArgs>();
   args->scene.add_to(*sub);
   args->solve.add_to(*sub, true);
-  auto* eye = sub->add_option("--eye", args->eye, "the observer's eye")->type_name("X,Y,Z");
+  auto* eye = sub->add_option("--eye", args->eyes, "the observer's eye; given again, one set that serves all eyes, each within the reach")->type_name("X,Y,Z")->allow_extra_args(false);
   auto* path = sub->add_option("--path", args->path, "CSV of poses: columns x,y,z by name")->excludes(eye);
   sub->add_option("--dump", args->dump, "write each pose's ids, one a line, to DIR/00000.txt, DIR/00001.txt, ...")->type_name("DIR")->needs(path);
   sub->add_flag("--json", args->json, "print JSON");
   sub->callback([&action, args] {
-    if (args->eye.empty() && args->path.empty()) throw CLI::RequiredError("--eye or --path");
-    action = [args] { return run(*args); };
+    if (args->eyes.empty() && args->path.empty()) throw CLI::RequiredError("--eye or --path");
+    action = [args] { return run_pvs(*args); };
   });
 }
 

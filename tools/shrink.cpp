@@ -3,29 +3,45 @@
 #include <iostream>
 #include <memory>
 
+#ifdef IVIS_HAVE_CGAL
 #include "occluders/exact/exact_erosion.h"
+#endif
 #include "occluders/fast_erosion.h"
 #include "occluders/file.h"
 #include "tools/common.h"
+#include "tools/shrink_report.h"
 
 namespace ivis::tool {
 namespace {
 
-struct Args {
+struct ShrinkArgs {
   SceneArgs scene;
   ViewSpaceArgs space;
   std::string reach;
   std::string builder = "fast";
   std::filesystem::path out;
+  std::filesystem::path report;
   unsigned threads = 0;
   double voxel_m = 0;
   bool json = false;
 };
 
-Outcome run(const Args& args) {
+Result<std::unique_ptr<Eroder>> make_eroder(const std::string& builder) {
+  if (builder == "fast") return std::unique_ptr<Eroder>(std::make_unique<FastEroder>());
+#ifdef IVIS_HAVE_CGAL
+  return std::unique_ptr<Eroder>(std::make_unique<ExactEroder>());
+#else
+  return invalid_argument("--builder exact: this ivis is built without CGAL; build it with "
+                          "-DIVIS_WITH_CGAL=ON, or use --builder fast");
+#endif
+}
+
+Outcome run_shrink(const ShrinkArgs& args) {
   const auto reach = Reach::parse(args.reach);
   if (!reach) return reach.error();
   if (auto s = check_output_file(args.out); !s) return s.error();
+  if (!args.report.empty())
+    if (auto s = check_output_folder(args.report); !s) return s.error();
   Context context = make_context(args.json);
   context.threads = args.threads;
   ShrinkOptions options;
@@ -34,17 +50,16 @@ Outcome run(const Args& args) {
   if (!space) return space.error();
   options.view_space = *space;
   options.voxel_m = args.voxel_m;
+  options.fates = !args.report.empty();
+  auto eroder = make_eroder(args.builder);
+  if (!eroder) return eroder.error();
   const auto scene = args.scene.load(context);
   if (!scene) return scene.error();
-  std::unique_ptr<Eroder> eroder;
-  if (args.builder == "exact") {
-    eroder = std::make_unique<ExactEroder>();
-  } else {
-    eroder = std::make_unique<FastEroder>();
-  }
-  const auto shrunk = shrink(*scene, options, *eroder, context);
+  const auto shrunk = shrink(*scene, options, **eroder, context);
   if (!shrunk) return shrunk.error();
   if (auto s = write_occluders(args.out, shrunk->set); !s) return s.error();
+  if (!args.report.empty())
+    if (auto s = write_shrink_report(args.report, *scene, *shrunk); !s) return s.error();
   if (shrunk->set.shrunk.empty() && shrunk->set.solid_pieces.empty() && shrunk->set.sheets.empty() && shrunk->set.height_field.empty())
     std::cerr << "warning: no occluder is left for this reach: every PVS will list everything\n";
   const ShrinkReport& r = shrunk->report;
@@ -72,7 +87,7 @@ Outcome run(const Args& args) {
     return kOk;
   }
   std::cout << r.occluders_in << " objects -> " << r.occluders_out << " shrunk prisms in " << r.seconds << " s ("
-            << eroder->name() << " builder), " << 100 * r.volume_kept() << " % of the solids' volume kept\n";
+            << (*eroder)->name() << " builder), " << 100 * r.volume_kept() << " % of the solids' volume kept\n";
   if (r.convex_solids > 0)
     std::cout << "  " << r.convex_solids << " convex solids that are no prisms, " << r.convex_pieces << " of them thicker than the reach\n";
   if (r.sheet_tiles > 0)
@@ -81,6 +96,7 @@ Outcome run(const Args& args) {
   for (const auto& [reason, count] : r.left_out) std::cout << "  not taken: " << count << "  " << reason << '\n';
   if (r.voxels) std::cout << to_text(*r.voxels);
   std::cout << "written: " << args.out.string() << '\n';
+  if (!args.report.empty()) std::cout << "written: " << (args.report / "report.txt").string() << ", report.json, report.svg\n";
   return kOk;
 }
 
@@ -88,16 +104,17 @@ Outcome run(const Args& args) {
 
 void add_shrink(CLI::App& app, std::function<Outcome()>& action) {
   CLI::App* sub = app.add_subcommand("shrink", "shrink a scene's occluders by a reach and write them to a file");
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<ShrinkArgs>();
   args->scene.add_to(*sub);
   args->space.add_to(*sub);
   sub->add_option("--reach", args->reach, "ball:r | disc:r | cylinder:r,h | ellipsoid:a,b,c | box:a,b,c, metres")->required()->type_name("R");
   sub->add_option("-o,--output", args->out, "occluder file to write")->required()->type_name("F.ivo");
   sub->add_option("--builder", args->builder, "fast: edge capsules; exact: CGAL Minkowski sums, slow")->capture_default_str()->check(CLI::IsMember({"fast", "exact"}));
   sub->add_option("--voxels", args->voxel_m, "also take as solid whatever observers cannot get to, found with voxels of this side, metres; 0: do not")->type_name("SIZE_M")->capture_default_str()->check(number_within(0, 1e6));
+  sub->add_option("--report", args->report, "also write what became of each part: DIR/report.txt (a table), report.json, report.svg (from above)")->type_name("DIR");
   sub->add_option("--threads", args->threads, "0: as many as the machine has")->capture_default_str()->check(CLI::Range(0, 256));
   sub->add_flag("--json", args->json, "print JSON");
-  sub->callback([&action, args] { action = [args] { return run(*args); }; });
+  sub->callback([&action, args] { action = [args] { return run_shrink(*args); }; });
 }
 
 }  // namespace ivis::tool

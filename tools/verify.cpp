@@ -10,7 +10,7 @@
 namespace ivis::tool {
 namespace {
 
-struct Args {
+struct VerifyArgs {
   SceneArgs scene;
   SolveArgs solve;
   std::filesystem::path path;
@@ -62,16 +62,16 @@ Context without_progress(Context context) {
   return context;
 }
 
-BlockerChoice blockers(const Args& args) { return args.strict ? BlockerChoice::kOccluding : BlockerChoice::kDrawn; }
+BlockerChoice blockers(const VerifyArgs& args) { return args.strict ? BlockerChoice::kOccluding : BlockerChoice::kDrawn; }
 
-VerifyOptions verify_options(const Args& args) {
+VerifyOptions verify_options(const VerifyArgs& args) {
   VerifyOptions options;
   options.rays_per_culled_object = args.rays;
   options.seed = args.seed;
   return options;
 }
 
-Outcome verify_path(const Args& args, const Context& context) {
+Outcome verify_path(const VerifyArgs& args, const Context& context) {
   const auto reach = args.solve.parse_reach();
   if (!reach) return reach.error();
   const auto path = read_path(args.path);
@@ -79,12 +79,16 @@ Outcome verify_path(const Args& args, const Context& context) {
   const auto prepared = prepare(args.scene, args.solve, *reach, context);
   if (!prepared) return prepared.error();
   const auto& [scene, occluders, method] = **prepared;
+  VerifyOptions options = verify_options(args);
+  const auto frustum = args.solve.parse_frustum();
+  if (!frustum) return frustum.error();
+  options.frustum = *frustum;
   const Verifier verifier(scene, &occluders, blockers(args));
   Summary summary;
   for (std::size_t row = 0; row < path->size(); row += args.stride) {
     const auto pvs = method->solve({(*path)[row].eye, *reach});
     if (!pvs) return pvs.error();
-    const auto report = verifier.check(*pvs, verify_options(args), without_progress(context));
+    const auto report = verifier.check(*pvs, options, without_progress(context));
     if (!report) return report.error();
     summary.add(*report);
     context.report("verify", std::min(row + args.stride, path->size()), path->size());
@@ -93,7 +97,7 @@ Outcome verify_path(const Args& args, const Context& context) {
 }
 
 /// A covered frame was promised for its whole cell, an uncovered one was drawn from its eye alone.
-Outcome verify_record(const Args& args, const Context& context) {
+Outcome verify_record(const VerifyArgs& args, const Context& context) {
   const auto record = client::read_record(args.record);
   if (!record) return record.error();
   if (auto s = args.solve.check_files(); !s) return s.error();
@@ -127,7 +131,7 @@ Outcome verify_record(const Args& args, const Context& context) {
   return summary.report(args.json);
 }
 
-Outcome run(const Args& args) {
+Outcome run_verify(const VerifyArgs& args) {
   const Context context = make_context(args.json);
   return args.record.empty() ? verify_path(args, context) : verify_record(args, context);
 }
@@ -136,7 +140,7 @@ Outcome run(const Args& args) {
 
 void add_verify(CLI::App& app, std::function<Outcome()>& action) {
   CLI::App* sub = app.add_subcommand("verify", "shoot rays at what a PVS leaves out; exit code 1 if one arrives");
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<VerifyArgs>();
   args->scene.add_to(*sub);
   args->solve.add_to(*sub, false);
   auto* path = sub->add_option("--path", args->path, "CSV of poses; needs --reach");
@@ -148,8 +152,10 @@ void add_verify(CLI::App& app, std::function<Outcome()>& action) {
   sub->add_flag("--json", args->json, "print JSON");
   sub->callback([&action, args] {
     if (args->path.empty() && args->record.empty()) throw CLI::RequiredError("--path or --record");
+    if (!args->record.empty() && !args->solve.frustum.empty())
+      throw CLI::ExcludesError("--record", "--frustum");  // a client is told of every direction
     if (!args->path.empty() && args->solve.reach.empty()) throw CLI::RequiredError("--reach");
-    action = [args] { return run(*args); };
+    action = [args] { return run_verify(*args); };
   });
 }
 

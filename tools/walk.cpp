@@ -11,7 +11,7 @@
 namespace ivis::tool {
 namespace {
 
-struct Args {
+struct WalkArgs {
   std::string endpoint;
   std::filesystem::path path;
   std::string policy = "stall";
@@ -27,7 +27,7 @@ void live_line(const WalkProgress& p) {
                static_cast<unsigned long long>(p.stalls), static_cast<unsigned long long>(p.uncovered_frames), p.done == p.total ? "\n" : "");
 }
 
-Outcome run(const Args& args) {
+Outcome run_walk(const WalkArgs& args) {
   if (!args.reach.empty())
     if (auto reach = Reach::parse(args.reach); !reach) return reach.error();
   if (!args.record.empty())
@@ -68,7 +68,7 @@ Outcome run(const Args& args) {
 
 void add_walk(CLI::App& app, std::function<Outcome()>& action) {
   CLI::App* sub = app.add_subcommand("walk", "walk a client along a path past a running ivisd, and account for it");
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<WalkArgs>();
   sub->add_option("--connect", args->endpoint, "the daemon's address, as in tcp://127.0.0.1:7447")->required()->type_name("E");
   sub->add_option("--path", args->path, "CSV of poses: columns x,y,z by name")->required();
   sub->add_option("--policy", args->policy, "outside the cell of the last PVS: stall there, or draw incomplete")->capture_default_str()->check(CLI::IsMember({"stall", "incomplete"}));
@@ -76,7 +76,7 @@ void add_walk(CLI::App& app, std::function<Outcome()>& action) {
   sub->add_option("--hz", args->hz, "poses a second; 0: as fast as answers come, each pose waits for its own")->capture_default_str()->check(number_within(0, 1000));
   sub->add_option("--record", args->record, "write what the client was told, for 'ivis verify --record'");
   sub->add_flag("--json", args->json, "print JSON");
-  sub->callback([&action, args] { action = [args] { return run(*args); }; });
+  sub->callback([&action, args] { action = [args] { return run_walk(*args); }; });
 }
 
 }  // namespace ivis::tool

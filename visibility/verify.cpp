@@ -22,7 +22,8 @@ constexpr std::size_t kViewpoints = 64;
 constexpr std::size_t kSectors = 32;
 /// Outermost viewpoints a sector: half to either side.
 constexpr std::size_t kOutermost = 8;
-/// They stop at the first that arrives; four times as many more find about two objects in a hundred more.
+/// They stop at the first that arrives; four times as many more find about two objects in a hundred
+/// more.
 constexpr std::size_t kRaysAListedObject = 256;
 /// Suspects of one object and chunk that may fail to be confirmed before the rest are let go.
 constexpr std::uint8_t kMaxRefuted = 200;
@@ -95,11 +96,11 @@ struct Verifier::Impl {
   Vec3 point_on(const RayPacket& packet, int lane) const;
   void trace_chunk(const Viewpoints& from, std::span<const ObjectId> targets,
                    const std::vector<bool>& wanted, std::size_t rays_each, std::uint64_t seed,
-                   Sightings& result) const;
+                   const Frustum* frustum, Sightings& result) const;
   /// Aims rays at every target; what of `wanted` they see, confirmed.
   Sightings sight(const Viewpoints& from, std::span<const ObjectId> targets,
                   const std::vector<bool>& wanted, std::size_t rays_each, std::uint64_t seed,
-                  const Context& context) const;
+                  const Frustum* frustum, const Context& context) const;
 };
 
 Vec3 Verifier::Impl::point_on(const RayPacket& packet, int lane) const {
@@ -115,11 +116,13 @@ Vec3 Verifier::Impl::point_on(const RayPacket& packet, int lane) const {
 
 void Verifier::Impl::trace_chunk(const Viewpoints& from, std::span<const ObjectId> targets,
                                  const std::vector<bool>& wanted, std::size_t rays_each,
-                                 std::uint64_t seed, Sightings& result) const {
+                                 std::uint64_t seed, const Frustum* frustum,
+                                 Sightings& result) const {
   constexpr int kWidth = RayPacket::kWidth;
   std::vector<std::uint8_t> state(scene.objects.size());  // refuted suspects, or kFound
   const auto suspect = [&](ObjectId id, const Vec3& viewpoint, const Vec3& point) {
     if (!wanted[id] || state[id] >= kMaxRefuted) return;
+    if (frustum != nullptr && !frustum->can_look_along(point - viewpoint)) return;
     if (exact.blocked(viewpoint, point)) {
       ++state[id];
     } else {
@@ -181,7 +184,8 @@ void Verifier::Impl::trace_chunk(const Viewpoints& from, std::span<const ObjectI
 
 Sightings Verifier::Impl::sight(const Viewpoints& from, std::span<const ObjectId> targets,
                                 const std::vector<bool>& wanted, std::size_t rays_each,
-                                std::uint64_t seed, const Context& context) const {
+                                std::uint64_t seed, const Frustum* frustum,
+                                const Context& context) const {
   Sightings all;
   if (from.points.empty() || targets.empty()) return all;
   // Chunks do not depend on the number of threads, so neither does what they find.
@@ -191,7 +195,7 @@ Sightings Verifier::Impl::sight(const Viewpoints& from, std::span<const ObjectId
   parallel_for(context, chunks, [&](std::size_t c) {
     const std::size_t first = c * chunk;
     trace_chunk(from, targets.subspan(first, std::min(chunk, targets.size() - first)), wanted,
-                rays_each, seed, found[c]);
+                rays_each, seed, frustum, found[c]);
   });
   for (const Sightings& s : found) {
     all.rays += s.rays;
@@ -223,6 +227,7 @@ Result<CellReport> Verifier::check(const Pvs& pvs, const VerifyOptions& options,
                       std::to_string(listed.size()));
     listed[id] = true;
   }
+  const Frustum* frustum = options.frustum ? &*options.frustum : nullptr;
   CellReport report;
   report.pvs = pvs.objects.size();
   std::vector<bool> culled(listed);
@@ -244,13 +249,13 @@ Result<CellReport> Verifier::check(const Pvs& pvs, const VerifyOptions& options,
                         pvs.cell.eye);
   report.viewpoints = from.points.size();
   Sightings missed =
-      impl_->sight(from, targets, culled, options.rays_per_culled_object, seed, context);
+      impl_->sight(from, targets, culled, options.rays_per_culled_object, seed, frustum, context);
   if (context.stopped()) return cancelled();
   const std::size_t seen_missed = missed.seen.size();
   misses.insert(misses.end(), missed.seen.begin(), missed.seen.end());
   std::sort(misses.begin(), misses.end(), [](const Miss& a, const Miss& b) { return a.id < b.id; });
   const Sightings seen =
-      impl_->sight(from, listed_targets, listed, kRaysAListedObject, mix(seed), context);
+      impl_->sight(from, listed_targets, listed, kRaysAListedObject, mix(seed), frustum, context);
   if (context.stopped()) return cancelled();
 
   report.rays = missed.rays;
@@ -271,7 +276,7 @@ std::vector<ObjectId> Verifier::seen_from(const ViewCell& cell, std::size_t rays
   const std::uint64_t cell_seed = seed_of(cell, seed);
   const Viewpoints from(impl_->space.viewpoints(cell, kViewpoints, cell_seed), cell.eye);
   std::vector<ObjectId> ids;
-  for (const Miss& s : impl_->sight(from, targets, wanted, rays, cell_seed, context).seen)
+  for (const Miss& s : impl_->sight(from, targets, wanted, rays, cell_seed, nullptr, context).seen)
     ids.push_back(s.id);
   return ids;
 }

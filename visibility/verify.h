@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/context.h"
+#include "core/frustum.h"
 #include "core/pvs.h"
 #include "core/result.h"
 #include "occluders/occluder_set.h"
@@ -24,6 +26,8 @@ struct VerifyOptions {
   std::size_t rays_per_culled_object = 64;
   std::uint64_t seed = 1;
   std::size_t max_listed = 20;
+  /// Only what can be in this picture counts as seen: for answers that were culled by it.
+  std::optional<Frustum> frustum;
 };
 
 /// Of one cell.

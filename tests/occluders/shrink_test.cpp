@@ -285,6 +285,45 @@ TEST(Shrink, TheDistanceCheckDropsWhatAFaultyEroderGives) {
   EXPECT_THAT(s->report.left_out, Contains(Pair("failed distance check", 1U)));
 }
 
+TEST(Shrink, TellsWhatBecameOfEachObject) {
+  SceneBuilder b;
+  const ObjectId thick = b.add_box({0, 0, 0}, {20, 10, 20});
+  const ObjectId thin = b.add_box({40, 0, 0}, {60, 10, 1.5});
+  const ObjectId wing =
+      b.add_box({20, 0, 5}, {22, 10, 15});  // thin alone, but it touches the thick one
+  const ObjectId never = b.add_box({80, 0, 0}, {100, 10, 20}, OccluderTag::kNever);
+  const ObjectId open = b.add_ground({120, 0}, {130, 10}, 3);
+  const Scene scene = std::move(b).finish();
+  ShrinkOptions options;
+  options.reach = Reach::disc(1);
+  options.fates = true;
+  const auto s = shrink(scene, options, FastEroder{});
+  ASSERT_TRUE(s);
+  const auto& fates = s->report.objects;
+  ASSERT_THAT(fates, SizeIs(scene.objects.size()));
+  for (std::size_t i = 0; i < fates.size(); ++i)
+    EXPECT_EQ(fates[i].object, &scene.objects[i]);
+  EXPECT_EQ(fates[thick].prisms, 1U);
+  EXPECT_FALSE(fates[thick].vanished);
+  EXPECT_NEAR(fates[thick].volume, 4000, 1e-6);
+  EXPECT_THAT(fates[thick].left_out, IsEmpty());
+  EXPECT_EQ(fates[thin].prisms, 1U);
+  EXPECT_TRUE(fates[thin].vanished);
+  EXPECT_FALSE(fates[wing].vanished) << "fused first";
+  EXPECT_EQ(fates[never].prisms, 0U);
+  EXPECT_FALSE(fates[never].vanished);
+  EXPECT_THAT(fates[never].left_out, Contains(Pair("marked never", 1U)));
+  EXPECT_THAT(fates[open].left_out, Contains(Pair("open mesh", 1U)));
+  std::map<std::string, std::size_t> sum;
+  for (const ObjectFate& f : fates)
+    for (const auto& [reason, count] : f.left_out)
+      sum[reason] += count;
+  for (const auto& [reason, count] : sum)
+    EXPECT_EQ(s->report.left_out.at(reason), count) << reason;
+  options.fates = false;
+  EXPECT_THAT(shrink(scene, options, FastEroder{})->report.objects, IsEmpty());
+}
+
 TEST(Shrink, AnEmptySceneGivesAnEmptySet) {
   const Shrunk s = shrink_well(SceneBuilder{}.finish(), Reach::ball(1));
   EXPECT_THAT(s.set.shrunk, IsEmpty());

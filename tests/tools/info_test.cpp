@@ -54,6 +54,31 @@ TEST(ToolObjects, ANameThatIsNotUtf8DoesNotEndInACrash) {
   EXPECT_EQ(ivis({"info", town.folder / "\xff\xfe.glb", "--json"}).code, 3);
 }
 
+TEST(ToolShrink, ReportsWhatBecameOfEveryObject) {
+  const SmallTown town;
+  const std::string out = town.folder / "t.ivo";
+  const std::string folder = town.folder / "a/b";
+  const Ran ran = ivis({"shrink", town.scene, "--reach", "disc:1", "-o", out, "--report", folder});
+  ASSERT_EQ(ran.code, 0) << ran.errors;
+  const Json j = Json::parse(read(folder + "/report.json"));
+  ASSERT_EQ(j["objects"].size(), SmallTown::kObjects);
+  std::size_t taken = 0;
+  for (const Json& o : j["objects"])
+    taken += o["fate"] == "taken" ? 1 : 0;
+  EXPECT_GE(taken, SmallTown::kHouses);
+  const std::string table = read(folder + "/report.txt");
+  EXPECT_NE(table.find(std::to_string(taken) + "  taken"), std::string::npos) << table;
+  EXPECT_NE(table.find("disc:1"), std::string::npos);
+  const std::string picture = read(folder + "/report.svg");
+  EXPECT_EQ(picture.rfind("<svg ", 0), 0U);
+  EXPECT_NE(picture.find("</svg>"), std::string::npos);
+  EXPECT_NE(ran.out.find("report.txt"), std::string::npos);
+  const Ran refused =
+      ivis({"shrink", town.scene, "--reach", "disc:1", "-o", out, "--report", out + "/r"});
+  EXPECT_EQ(refused.code, 3);
+  EXPECT_NE(refused.errors.find("t.ivo"), std::string::npos) << refused.errors;
+}
+
 TEST(ToolShrink, WritesAFileAndPrintsTheFixedKeys) {
   const SmallTown town;
   for (const std::string builder : {"fast", "exact"}) {
@@ -62,8 +87,8 @@ TEST(ToolShrink, WritesAFileAndPrintsTheFixedKeys) {
                           "--builder", builder, "--json"});
     ASSERT_EQ(ran.code, 0) << ran.errors;
     const Json j = ran.json();
-    EXPECT_EQ(keys(j),
-              (Keys{"occluders_in", "occluders_out", "left_out", "volume_kept", "seconds", "parts"}));
+    EXPECT_EQ(keys(j), (Keys{"occluders_in", "occluders_out", "left_out", "volume_kept", "seconds",
+                             "parts"}));
     EXPECT_GE(j["parts"]["prism_pieces"], SmallTown::kHouses) << "for the occlusion map";
     EXPECT_GE(j["occluders_out"], SmallTown::kHouses);
     // 28 x 22 m less 1.5 m all round; a few centimetres of slack.

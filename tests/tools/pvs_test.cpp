@@ -28,8 +28,8 @@ TEST(ToolPvs, PrintsTheFixedKeys) {
   const Ran ran = ivis({"pvs", town.scene, "--eye", SmallTown::kEye, "--reach", kReach, "--json"});
   ASSERT_EQ(ran.code, 0) << ran.errors;
   const Json j = ran.json();
-  EXPECT_EQ(keys(j),
-            (Keys{"method", "guarantee", "objects", "count", "total", "compute_ms", "wall_ms", "backend"}));
+  EXPECT_EQ(keys(j), (Keys{"method", "guarantee", "objects", "count", "total", "compute_ms",
+                           "wall_ms", "backend"}));
   EXPECT_EQ(j["guarantee"], "conservative");
   EXPECT_EQ(j["total"], SmallTown::kObjects);
   EXPECT_EQ(j["count"], j["objects"].size());
@@ -72,6 +72,39 @@ TEST(ToolPvs, TheBackendThatIsAskedForAnswersOrSaysWhyNot) {
   }
   EXPECT_EQ(run("cull-map", "gl").code, 2);
   EXPECT_EQ(run("occlusion-map", "direct3d").code, 2);
+}
+
+TEST(ToolPvs, AFrustumListsPartOfTheSetAndOppositeOnesListItAll) {
+  const SmallTown town;
+  const Ids all = pvs_ids(town, SmallTown::kEye);
+  Ids both = pvs_ids(town, SmallTown::kEye, {"--frustum", "0,0,179.9,179.9,0"});
+  EXPECT_LT(both.size(), all.size());
+  const Ids back = pvs_ids(town, SmallTown::kEye, {"--frustum", "180,0,179.9,179.9,0"});
+  EXPECT_LT(back.size(), all.size());
+  both.insert(both.end(), back.begin(), back.end());
+  std::sort(both.begin(), both.end());
+  both.erase(std::unique(both.begin(), both.end()), both.end());
+  EXPECT_EQ(both, all);
+  EXPECT_EQ(pvs_ids(town, SmallTown::kEye, {"--frustum", "0,0,90,60,180"}), all) << "free turning";
+}
+
+TEST(ToolPvs, SeveralEyesGetOneSetThatHoldsEachOnes) {
+  const SmallTown town;
+  const std::string left = "10,1.7,27.97";
+  const std::string right = "10,1.7,28.03";
+  const Ids both = pvs_ids(town, left, {"--eye", right});
+  EXPECT_LT(both.size(), SmallTown::kObjects);
+  for (const std::string& eye : {left, right}) {
+    const Ids one = pvs_ids(town, eye);
+    std::size_t held = 0;
+    for (const unsigned id : one)
+      held += std::binary_search(both.begin(), both.end(), id) ? 1 : 0;
+    EXPECT_GT(held, one.size() * 95 / 100) << "sets are no more than conservative, but near";
+  }
+  // A value of --eye does not swallow the scene that follows it.
+  EXPECT_EQ(
+      ivis({"pvs", "--eye", left, "--reach", kReach, "--json", "--eye", right, town.scene}).code,
+      0);
 }
 
 TEST(ToolPvs, ThreadsChangeNothing) {

@@ -59,6 +59,23 @@ TEST(ToolVerify, FindsNothingMissingAlongAPath) {
   }
 }
 
+TEST(ToolVerify, FindsNothingMissingInAFrustum) {
+  const SmallTown town;
+  const auto run = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"verify", town.scene, "--path", town.path, "--reach",
+                                       kReach,   "--stride", "3",      "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Ran ran = ivis(arguments);
+    EXPECT_EQ(ran.code, 0) << ran.out << ran.errors;
+    return ran.json();
+  };
+  const Json whole = run({});
+  const Json part = run({"--frustum", "90,0,60,40,5"});
+  EXPECT_EQ(part["false_negatives"], 0);
+  EXPECT_LT(part["pvs_median"], whole["pvs_median"]);
+  EXPECT_LT(part["seen_median"], whole["seen_median"]);
+}
+
 TEST(ToolVerify, MoreRaysAndASmallerStrideShootMore) {
   const SmallTown town;
   const auto rays = [&](const char* n, const char* stride) {

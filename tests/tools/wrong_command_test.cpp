@@ -53,6 +53,11 @@ TEST(ToolRefuses, UsageErrorsWithCodeTwo) {
                    "--threads");
   expect_refused({"pvs", t.scene, "--eye", eye, "--reach", "disc:1", "--max-occluders=-1"}, 2,
                  "--max-occluders");
+  for (const std::string bad :
+       {"90,0,90,60", "0,0,0,60,5", "0,0,90,180,5", "0,95,90,60,5", "a,0,90,60,5"})
+    expect_refused({"pvs", t.scene, "--eye", eye, "--reach", "disc:1", "--frustum", bad}, 2, bad);
+  expect_refused({"verify", t.scene, "--record", t.path, "--frustum", "0,0,90,60,5"}, 2,
+                 "--frustum");
   expect_refused({"verify", t.scene}, 2, "--path");
   expect_refused({"verify", t.scene, "--path", t.path}, 2, "--reach");
   expect_refused({"verify", t.scene, "--path", t.path, "--record", t.path, "--reach", "disc:1"}, 2,

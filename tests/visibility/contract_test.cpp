@@ -13,6 +13,7 @@
 #include "tests/support/scene_builder.h"
 #include "tests/visibility/contract_scenes.h"
 #include "visibility/cull_map.h"
+#include "visibility/frustum_cull.h"
 #include "visibility/method.h"
 #include "visibility/verify.h"
 
@@ -127,6 +128,54 @@ TEST(MethodContractCity, ListsWhatTheReferenceSeesInASmallCity) {
   const ContractScene city = test::small_city();
   ASSERT_FALSE(city.eyes.empty());
   expect_contract(city, {Reach::disc(1), Reach::cylinder(1.5, 0.1)});
+}
+
+TEST(MethodContractFrustum, ListsWhatCanBeInThePictureAndNoneOfWhatIsBehind) {
+  const ContractScene city = test::small_city();
+  const Reach reach = Reach::cylinder(1.5, 0.1);
+  const OccluderSet set = shrunk(city.scene, reach);
+  const Verifier verifier(city.scene, &set, BlockerChoice::kOccluding);
+  VerifyOptions options;
+  std::size_t missed_when_too_narrow = 0;
+  for (const Way& way : ways()) {
+    if (way.traits.guarantee != Guarantee::kConservative) continue;
+    for (std::size_t i = 0; i < city.eyes.size(); ++i) {
+      const Frustum frustum{73.0 * static_cast<double>(i), i % 2 == 0 ? -5.0 : 10.0, 70, 50, 8};
+      options.frustum = frustum;
+      const ViewCell cell{city.eyes[i], reach};
+      const auto whole = made(way, city.scene, set)->solve(cell);
+      const auto pvs =
+          cull_by_frustum(made(way, city.scene, set), city.scene, frustum)->solve(cell);
+      ASSERT_TRUE(whole && pvs);
+      EXPECT_LT(2 * pvs->objects.size(), whole->objects.size()) << "less than a quarter of a turn";
+      EXPECT_TRUE(std::includes(whole->objects.begin(), whole->objects.end(), pvs->objects.begin(),
+                                pvs->objects.end()));
+      const auto report = verifier.check(*pvs, options);
+      ASSERT_TRUE(report);
+      EXPECT_EQ(report->false_negatives, 0U) << way.name() << ", eye " << i;
+
+      Frustum narrow = frustum;  // as if the view did not turn
+      narrow.turn_deg = 0;
+      const auto too_few =
+          cull_by_frustum(made(way, city.scene, set), city.scene, narrow)->solve(cell);
+      ASSERT_TRUE(too_few);
+      missed_when_too_narrow += verifier.check(*too_few, options)->false_negatives;
+    }
+  }
+  EXPECT_GT(missed_when_too_narrow, 0U) << "the check has no power";
+}
+
+TEST(MethodContractFrustum, AMoverStays) {
+  for (const auto& s : test::analytic_scenes()) {
+    if (s.mover == ~0U) continue;
+    const OccluderSet set = shrunk(s.scene, Reach::disc(1));
+    for (const double yaw : {0.0, 180.0}) {
+      const auto pvs = cull_by_frustum(made(ways()[0], s.scene, set), s.scene, {yaw, 0, 20, 20, 0})
+                           ->solve({s.eyes[0], Reach::disc(1)});
+      ASSERT_TRUE(pvs);
+      EXPECT_TRUE(lists(*pvs, s.mover)) << s.name;
+    }
+  }
 }
 
 TEST(MethodContractCell, WallsThatTouchHideWhatIsBehindTheirSeam) {

@@ -1,0 +1,40 @@
+#include "visibility/frustum_cull.h"
+
+#include <utility>
+
+namespace ivis {
+namespace {
+
+class FrustumCull final : public Method {
+ public:
+  FrustumCull(std::unique_ptr<Method> method, const Scene& scene, const Frustum& frustum)
+      : method_(std::move(method)), scene_(scene), frustum_(frustum) {}
+
+  const MethodTraits& traits() const override { return method_->traits(); }
+  Backend backend() const override { return method_->backend(); }
+
+  Result<Pvs> solve(const ViewCell& cell) const override {
+    auto pvs = method_->solve(cell);
+    if (!pvs || !pvs->everything_because.empty()) return pvs;
+    const FrustumSweep sweep(frustum_, cell);
+    std::erase_if(pvs->objects, [&](ObjectId id) {
+      const Object& o = scene_.objects[id];
+      return !o.always_visible && !sweep.may_meet(o.bounds);
+    });
+    return pvs;
+  }
+
+ private:
+  std::unique_ptr<Method> method_;
+  const Scene& scene_;
+  Frustum frustum_;
+};
+
+}  // namespace
+
+std::unique_ptr<Method> cull_by_frustum(std::unique_ptr<Method> method, const Scene& scene,
+                                        const Frustum& frustum) {
+  return std::make_unique<FrustumCull>(std::move(method), scene, frustum);
+}
+
+}  // namespace ivis
