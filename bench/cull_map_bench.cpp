@@ -1,9 +1,10 @@
-// The polar cull map against the pinned yardstick, in one run on one thread: medians of CPU time a pose, interleaved
-// round by round, and a hash of all answers, so that a fast wrong answer shows.
+// The polar cull map against the pinned yardstick, in one run on one thread: medians of CPU time a
+// pose, interleaved round by round, and a hash of all answers, so that a fast wrong answer shows.
 //
 //   cull_map_bench SCENE.glb PATH.csv REACH [ROUNDS] [TILES]
 //
-// TILES n > 1 adds the same scene tiled n x n, walked in its middle tile: cost must follow what is seen.
+// TILES n > 1 adds the same scene tiled n x n, walked in its middle tile: cost must follow what is
+// seen.
 
 #include <algorithm>
 #include <cstdio>
@@ -127,19 +128,29 @@ int main(int argc, char** argv) {
       yard_ms.push_back(cpu_ms() - begin);
       if (r == 0) yard_boxes.push_back(static_cast<double>(n));
     }
-    for (auto& s : subjects) s->run(path, reach, r == 0);
+    for (auto& s : subjects)
+      s->run(path, reach, r == 0);
   }
   const double yard = median(yard_ms);
-  std::printf("SIMD target %s, %zu poses, %d rounds, reach %s\n", simd_target(), path.size(), rounds, argv[3]);
+  std::printf("SIMD target %s, %zu poses, %d rounds, reach %s\n", simd_target(), path.size(),
+              rounds, argv[3]);
   std::printf("%-10s %9.4f ms a pose  %6.0f boxes\n", "yardstick", yard, median(yard_boxes));
   for (const auto& s : subjects) {
     const double ms = median(s->ms);
     const auto poses = static_cast<double>(path.size());
-    std::printf("%-10s %9.4f ms a pose  %6.0f boxes (%.0f objects of %zu)  yardstick / it %.1f  hash %016llx\n", s->name.c_str(), ms,
-                median(s->boxes), median(s->counts), s->scene.objects.size(), yard / ms, static_cast<unsigned long long>(s->hash));
-    std::printf("           a pose: %.0f solids drawn of %zu, %.0f walls, %.0f nodes tested; undersides %u\n", s->stats.polar.solids_drawn / poses,
-                s->occluders.shrunk.size(), s->stats.polar.walls_drawn / poses, s->stats.polar.nodes_tested / poses, s->stats.undersides);
+    std::printf(
+        "%-10s %9.4f ms a pose  %6.0f boxes (%.0f objects of %zu)  yardstick / it %.1f  hash "
+        "%016llx\n",
+        s->name.c_str(), ms, median(s->boxes), median(s->counts), s->scene.objects.size(),
+        yard / ms, static_cast<unsigned long long>(s->hash));
+    std::printf(
+        "           a pose: %.0f solids drawn of %zu, %.0f walls, %.0f nodes tested; undersides "
+        "%u\n",
+        s->stats.polar.solids_drawn / poses, s->occluders.shrunk.size(),
+        s->stats.polar.walls_drawn / poses, s->stats.polar.nodes_tested / poses,
+        s->stats.undersides);
   }
-  if (subjects.size() > 1) std::printf("tiled / plain %.2f\n", median(subjects[1]->ms) / median(subjects[0]->ms));
+  if (subjects.size() > 1)
+    std::printf("tiled / plain %.2f\n", median(subjects[1]->ms) / median(subjects[0]->ms));
   return 0;
 }

@@ -15,7 +15,8 @@ unsigned Context::thread_count() const {
 void parallel_for(const Context& ctx, std::size_t n, const std::function<void(std::size_t)>& body) {
   const std::size_t workers = std::min<std::size_t>(ctx.thread_count(), n);
   if (workers <= 1) {
-    for (std::size_t i = 0; i < n && !ctx.stopped(); ++i) body(i);
+    for (std::size_t i = 0; i < n && !ctx.stopped(); ++i)
+      body(i);
     return;
   }
   std::atomic<std::size_t> next{0};
@@ -23,7 +24,8 @@ void parallel_for(const Context& ctx, std::size_t n, const std::function<void(st
   std::mutex failure_mutex;
   auto work = [&] {
     try {
-      for (std::size_t i = next++; i < n && !ctx.stopped(); i = next++) body(i);
+      for (std::size_t i = next++; i < n && !ctx.stopped(); i = next++)
+        body(i);
     } catch (...) {
       const std::lock_guard lock(failure_mutex);
       failure = std::current_exception();
@@ -32,7 +34,8 @@ void parallel_for(const Context& ctx, std::size_t n, const std::function<void(st
   };
   std::vector<std::jthread> threads;
   threads.reserve(workers - 1);
-  for (std::size_t t = 1; t < workers; ++t) threads.emplace_back(work);
+  for (std::size_t t = 1; t < workers; ++t)
+    threads.emplace_back(work);
   work();
   threads.clear();
   if (failure) std::rethrow_exception(failure);

@@ -8,8 +8,8 @@
 
 namespace ivis {
 
-/// What a long piece of work is told by its caller: where to report, when to stop, how many threads.
-/// Threads: the callbacks may be called from any thread, one at a time for a given work.
+/// What a long piece of work is told by its caller: where to report, when to stop, how many
+/// threads. Threads: the callbacks may be called from any thread, one at a time for a given work.
 /// Ownership: borrowed for the length of the call.
 struct Context {
   /// Progress of the named stage: `done` of `total`; null is silent.
@@ -31,8 +31,8 @@ struct Context {
   unsigned thread_count() const;
 };
 
-/// Calls `body(i)` for i in [0, n) from `threads` threads, in no order; stops early when ctx.stopped().
-/// Cost: one atomic increment an index: make the body large.
+/// Calls `body(i)` for i in [0, n) from `threads` threads, in no order; stops early when
+/// ctx.stopped(). Cost: one atomic increment an index: make the body large.
 void parallel_for(const Context& ctx, std::size_t n, const std::function<void(std::size_t)>& body);
 
 }  // namespace ivis

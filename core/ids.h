@@ -9,7 +9,8 @@ namespace ivis {
 using ObjectId = std::uint32_t;
 /// Position of an object in the spatial order that the wire uses.
 using Rank = std::uint32_t;
-/// Content hash of a scene; rides through every value, so that two ends with different scenes say so.
+/// Content hash of a scene; rides through every value, so that two ends with different scenes say
+/// so.
 using SceneHash = std::uint64_t;
 
 /// As hashes are shown to people: sixteen digits, lower case.

@@ -11,6 +11,8 @@ using Vec2 = glm::dvec2;  ///< (x, z) in the ground plane
 using Vec3 = glm::dvec3;
 using Mat4 = glm::dmat4;
 
-inline Vec2 ground(const Vec3& p) { return {p.x, p.z}; }
+inline Vec2 ground(const Vec3& p) {
+  return {p.x, p.z};
+}
 
 }  // namespace ivis

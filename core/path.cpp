@@ -18,7 +18,8 @@ namespace {
 constexpr std::size_t kMaxPathBytes = 256U << 20U;
 
 std::string_view trimmed(std::string_view s) {
-  while (!s.empty() && (s.front() == ' ' || s.front() == '\t' || s.front() == '"')) s.remove_prefix(1);
+  while (!s.empty() && (s.front() == ' ' || s.front() == '\t' || s.front() == '"'))
+    s.remove_prefix(1);
   while (!s.empty() && (s.back() == ' ' || s.back() == '\t' || s.back() == '\r' || s.back() == '"'))
     s.remove_suffix(1);
   return s;
@@ -34,13 +35,16 @@ std::vector<std::string_view> split(std::string_view line) {
   }
 }
 
-std::string system_reason() { return std::generic_category().message(errno); }
+std::string system_reason() {
+  return std::generic_category().message(errno);
+}
 
 }  // namespace
 
 Result<std::string> read_file_whole(const std::filesystem::path& file, std::size_t max_bytes) {
   std::error_code ec;
-  if (std::filesystem::is_directory(file, ec)) return io_error("'" + file.string() + "' is a folder, expected a file");
+  if (std::filesystem::is_directory(file, ec))
+    return io_error("'" + file.string() + "' is a folder, expected a file");
   errno = 0;
   std::ifstream in(file, std::ios::binary);
   if (!in) return io_error("cannot open '" + file.string() + "': " + system_reason());
@@ -119,8 +123,10 @@ Result<std::vector<Pose>> read_path(const std::filesystem::path& file) {
       if (*column[k] >= cells.size()) return input_error(where + "missing");
       const auto cell = cells[*column[k]];
       const auto parsed = std::from_chars(cell.data(), cell.data() + cell.size(), v[k]);
-      if (parsed.ec != std::errc{} || parsed.ptr != cell.data() + cell.size() || !std::isfinite(v[k]))
-        return input_error(where + "found '" + std::string(cell.substr(0, 40)) + "', expected a finite number");
+      if (parsed.ec != std::errc{} || parsed.ptr != cell.data() + cell.size() ||
+          !std::isfinite(v[k]))
+        return input_error(where + "found '" + std::string(cell.substr(0, 40)) +
+                           "', expected a finite number");
     }
     poses.push_back({v[3], {v[0], v[1], v[2]}, v[4], v[5]});
   }

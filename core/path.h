@@ -18,15 +18,16 @@ struct Pose {
   double pitch_deg = 0;
 };
 
-/// Reads a path CSV: a header line, then a pose a row. Columns go by name (x, y, z needed; t, yaw_deg,
-/// pitch_deg optional; others ignored). Errors: kIo; kInput naming file, line, column and value.
+/// Reads a path CSV: a header line, then a pose a row. Columns go by name (x, y, z needed; t,
+/// yaw_deg, pitch_deg optional; others ignored). Errors: kIo; kInput naming file, line, column and
+/// value.
 Result<std::vector<Pose>> read_path(const std::filesystem::path& file);
 
 /// Writes the columns t,x,y,z,yaw_deg,pitch_deg. The file appears whole or not at all.
 Status write_path(const std::filesystem::path& file, const std::vector<Pose>& poses);
 
-/// Writes `bytes` to a temporary file beside `file`, then renames it: an interrupted or failed write
-/// leaves what was there before. Errors: kIo naming the file and the system's reason.
+/// Writes `bytes` to a temporary file beside `file`, then renames it: an interrupted or failed
+/// write leaves what was there before. Errors: kIo naming the file and the system's reason.
 Status write_file_whole(const std::filesystem::path& file, std::string_view bytes);
 
 /// Reads a whole file of at most `max_bytes`. Errors: kIo, kInput when larger.

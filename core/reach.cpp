@@ -66,23 +66,32 @@ Result<Reach> Reach::parse(std::string_view text) {
   }
   if (count != kind->numbers) return fail("too few numbers");
   switch (kind->kind) {
-    case Kind::kBall: return ball(v[0]);
-    case Kind::kDisc: return disc(v[0]);
-    case Kind::kCylinder: return cylinder(v[0], v[1]);
-    case Kind::kEllipsoid: return ellipsoid({v[0], v[1], v[2]});
-    case Kind::kBox: return box({v[0], v[1], v[2]});
+    case Kind::kBall:
+      return ball(v[0]);
+    case Kind::kDisc:
+      return disc(v[0]);
+    case Kind::kCylinder:
+      return cylinder(v[0], v[1]);
+    case Kind::kEllipsoid:
+      return ellipsoid({v[0], v[1], v[2]});
+    case Kind::kBox:
+      return box({v[0], v[1], v[2]});
   }
   return fail("unknown shape");
 }
 
 std::string Reach::to_string() const {
   switch (kind_) {
-    case Kind::kBall: return "ball:" + number(e_.x);
-    case Kind::kDisc: return "disc:" + number(e_.x);
-    case Kind::kCylinder: return "cylinder:" + number(e_.x) + "," + number(e_.y);
+    case Kind::kBall:
+      return "ball:" + number(e_.x);
+    case Kind::kDisc:
+      return "disc:" + number(e_.x);
+    case Kind::kCylinder:
+      return "cylinder:" + number(e_.x) + "," + number(e_.y);
     case Kind::kEllipsoid:
       return "ellipsoid:" + number(e_.x) + "," + number(e_.y) + "," + number(e_.z);
-    case Kind::kBox: return "box:" + number(e_.x) + "," + number(e_.y) + "," + number(e_.z);
+    case Kind::kBox:
+      return "box:" + number(e_.x) + "," + number(e_.y) + "," + number(e_.z);
   }
   return "?";
 }
@@ -90,10 +99,13 @@ std::string Reach::to_string() const {
 double Reach::support(const Vec3& d) const {
   switch (kind_) {
     case Kind::kBall:
-    case Kind::kEllipsoid: return glm::length(d * e_);
+    case Kind::kEllipsoid:
+      return glm::length(d * e_);
     case Kind::kDisc:
-    case Kind::kCylinder: return e_.x * std::hypot(d.x, d.z) + e_.y * std::abs(d.y);
-    case Kind::kBox: return glm::dot(glm::abs(d), e_);
+    case Kind::kCylinder:
+      return e_.x * std::hypot(d.x, d.z) + e_.y * std::abs(d.y);
+    case Kind::kBox:
+      return glm::dot(glm::abs(d), e_);
   }
   return 0;
 }
@@ -103,17 +115,20 @@ bool Reach::contains(const Vec3& v, double horizontal, double vertical) const {
   const Vec3 q{ratio(v.x, e.x), ratio(v.y, e.y), ratio(v.z, e.z)};
   switch (kind_) {
     case Kind::kBall:
-    case Kind::kEllipsoid: return glm::dot(q, q) <= 1;
+    case Kind::kEllipsoid:
+      return glm::dot(q, q) <= 1;
     case Kind::kDisc:
-    case Kind::kCylinder: return q.x * q.x + q.z * q.z <= 1 && std::abs(q.y) <= 1;
-    case Kind::kBox: return std::abs(q.x) <= 1 && std::abs(q.y) <= 1 && std::abs(q.z) <= 1;
+    case Kind::kCylinder:
+      return q.x * q.x + q.z * q.z <= 1 && std::abs(q.y) <= 1;
+    case Kind::kBox:
+      return std::abs(q.x) <= 1 && std::abs(q.y) <= 1 && std::abs(q.z) <= 1;
   }
   return false;
 }
 
 // Both sets are invariant under each axis' reflection, so only the positive octant counts, and a
-// convex set is inside another when its extreme points are. A box's are its corner; a cylinder's its
-// rim; an ellipsoid's its surface.
+// convex set is inside another when its extreme points are. A box's are its corner; a cylinder's
+// its rim; an ellipsoid's its surface.
 bool Reach::contains(const Reach& other, double tolerance) const {
   const Vec3& o = other.e_;
   const bool other_round = other.kind_ == Kind::kBall || other.kind_ == Kind::kEllipsoid;
@@ -138,12 +153,16 @@ Reach Reach::grown(double horizontal, double vertical) const {
   switch (kind_) {
     case Kind::kBall:
     case Kind::kDisc:
-    case Kind::kCylinder: return {Kind::kCylinder, g};
-    case Kind::kBox: return {Kind::kBox, g};
+    case Kind::kCylinder:
+      return {Kind::kCylinder, g};
+    case Kind::kBox:
+      return {Kind::kBox, g};
     case Kind::kEllipsoid: {
       // With f the largest relative growth of an axis, the cylinder's support is at most
-      // f (hypot(ex dx, ez dz) + ey |dy|) <= f sqrt(2) h_V(d): scaling V by 1 + sqrt(2) f holds the sum.
-      const double f = std::max({ratio(horizontal, e_.x), ratio(vertical, e_.y), ratio(horizontal, e_.z)});
+      // f (hypot(ex dx, ez dz) + ey |dy|) <= f sqrt(2) h_V(d): scaling V by 1 + sqrt(2) f holds the
+      // sum.
+      const double f =
+          std::max({ratio(horizontal, e_.x), ratio(vertical, e_.y), ratio(horizontal, e_.z)});
       if (std::isfinite(f)) return {Kind::kEllipsoid, e_ * (1 + std::numbers::sqrt2 * f)};
       return {Kind::kBox, g};
     }

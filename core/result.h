@@ -26,13 +26,27 @@ struct Error {
   std::string message;
 };
 
-inline Error invalid_argument(std::string m) { return {ErrorCode::kInvalidArgument, std::move(m)}; }
-inline Error input_error(std::string m) { return {ErrorCode::kInput, std::move(m)}; }
-inline Error io_error(std::string m) { return {ErrorCode::kIo, std::move(m)}; }
-inline Error mismatch(std::string m) { return {ErrorCode::kMismatch, std::move(m)}; }
-inline Error unsupported(std::string m) { return {ErrorCode::kUnsupported, std::move(m)}; }
-inline Error connection_error(std::string m) { return {ErrorCode::kConnection, std::move(m)}; }
-inline Error cancelled() { return {ErrorCode::kCancelled, "cancelled"}; }
+inline Error invalid_argument(std::string m) {
+  return {ErrorCode::kInvalidArgument, std::move(m)};
+}
+inline Error input_error(std::string m) {
+  return {ErrorCode::kInput, std::move(m)};
+}
+inline Error io_error(std::string m) {
+  return {ErrorCode::kIo, std::move(m)};
+}
+inline Error mismatch(std::string m) {
+  return {ErrorCode::kMismatch, std::move(m)};
+}
+inline Error unsupported(std::string m) {
+  return {ErrorCode::kUnsupported, std::move(m)};
+}
+inline Error connection_error(std::string m) {
+  return {ErrorCode::kConnection, std::move(m)};
+}
+inline Error cancelled() {
+  return {ErrorCode::kCancelled, "cancelled"};
+}
 
 /// A value or an Error; the member names of std::expected, which gcc 12 lacks.
 template <class T>
@@ -44,15 +58,27 @@ class [[nodiscard]] Result {
 
   bool has_value() const { return v_.index() == 0; }
   explicit operator bool() const { return has_value(); }
-  T& value() & { check(); return std::get<0>(v_); }
-  const T& value() const& { check(); return std::get<0>(v_); }
-  T&& value() && { check(); return std::get<0>(std::move(v_)); }
+  T& value() & {
+    check();
+    return std::get<0>(v_);
+  }
+  const T& value() const& {
+    check();
+    return std::get<0>(v_);
+  }
+  T&& value() && {
+    check();
+    return std::get<0>(std::move(v_));
+  }
   T& operator*() & { return value(); }
   const T& operator*() const& { return value(); }
   T&& operator*() && { return std::move(*this).value(); }
   T* operator->() { return &value(); }
   const T* operator->() const { return &value(); }
-  const Error& error() const { IVIS_ASSERT(!has_value(), "error() of a Result that holds a value"); return std::get<1>(v_); }
+  const Error& error() const {
+    IVIS_ASSERT(!has_value(), "error() of a Result that holds a value");
+    return std::get<1>(v_);
+  }
 
  private:
   void check() const { IVIS_ASSERT(has_value(), "value() of a Result that holds an error"); }
@@ -62,6 +88,8 @@ class [[nodiscard]] Result {
 struct Unit {};
 /// Result of something done for its effect.
 using Status = Result<Unit>;
-inline Status ok() { return Unit{}; }
+inline Status ok() {
+  return Unit{};
+}
 
 }  // namespace ivis

@@ -100,8 +100,7 @@ std::vector<Polygon> execute(cl::ClipType operation, const std::vector<Ring>& su
       clipper.AddPath(path, cl::ptClip, true);
     }
     cl::PolyTree tree;
-    if (!clipper.Execute(operation, tree, fill_type(fill), cl::pftNonZero))
-      return result;
+    if (!clipper.Execute(operation, tree, fill_type(fill), cl::pftNonZero)) return result;
     collect(tree, frame, result);
   } catch (const std::exception&) {  // out of the library's range: nothing is always safe
     result.clear();

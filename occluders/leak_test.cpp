@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
-#include "occluders/rect_tree.h"
 #include "occluders/progress.h"
+#include "occluders/rect_tree.h"
 #include "occluders/triangle_box.h"
 #include "occluders/voxel_rays.h"
 

@@ -10,6 +10,7 @@
 #include "occluders/gate.h"
 #include "occluders/inset.h"
 #include "occluders/progress.h"
+#include "occluders/rect_tree.h"
 
 namespace ivis {
 namespace {
@@ -31,6 +32,43 @@ std::vector<Polygon> within(const Polygon& polygon, const Vec2& lo, const Vec2& 
   if (b.lo.x >= lo.x && b.hi.x <= hi.x && b.lo.z >= lo.y && b.hi.z <= hi.y) return {polygon};
   return intersect(polygon.rings, Fill::kEvenOdd, {lo, {hi.x, lo.y}, hi, {lo.x, hi.y}});
 }
+
+/// Stacks that lie in one convex solid, which is shrunk and drawn itself, add nothing: what is left
+/// of them lies in what is left of it. (Unless they reach down: then they are drawn further down.)
+/// Leaving an occluder out is always safe, so corners may lie outside by a little.
+class ConvexCover {
+ public:
+  explicit ConvexCover(const std::vector<ConvexSolid>& solids) : solids_(solids) {
+    std::vector<Box2> boxes;
+    for (const ConvexSolid& s : solids)
+      boxes.push_back({ground(s.bounds.lo), ground(s.bounds.hi)});
+    tree_ = RectTree(boxes);
+  }
+  bool holds(const FusedStack& stack) const {
+    if (stack.levels.empty() || stack.levels.front().region.empty()) return false;
+    const Vec2 place = stack.levels.front().region.front().rings[0][0];
+    return !tree_.all({place, place}, [&](std::uint32_t i) { return !holds(solids_[i], stack); });
+  }
+
+ private:
+  static bool holds(const ConvexSolid& solid, const FusedStack& stack) {
+    constexpr double kOutsideM = 1e-3;
+    const auto inside = [&](const Vec3& p) {
+      return std::all_of(solid.planes.begin(), solid.planes.end(), [&](const auto& plane) {
+        return glm::dot(plane.normal, p) <= plane.offset + kOutsideM;
+      });
+    };
+    for (const FusedLevel& level : stack.levels)
+      for (const Polygon& polygon : level.region)
+        for (const auto& ring : polygon.rings)
+          for (const Vec2& c : ring)
+            if (!inside({c.x, stack.bottom, c.y}) || !inside({c.x, level.top, c.y})) return false;
+    return true;
+  }
+
+  const std::vector<ConvexSolid>& solids_;
+  RectTree tree_;
+};
 
 /// E(polygon, B(step)) or a little less: its mitred outline where that will do, in a tenth of the
 /// time.
@@ -129,10 +167,13 @@ std::size_t add_prism_ladder(const std::vector<FusedStack>& stacks,
                              const Context& context) {
   std::vector<std::vector<PrismPiece>> found(stacks.size());
   std::atomic<std::size_t> failed{0};
+  const ConvexCover cover(set.convex_solids);
   Progress progress(context, "margins", stacks.size());
   parallel_for(context, stacks.size(), [&](std::size_t i) {
     std::size_t missed = 0;
-    found[i] = pieces_of(stacks[i], eroded[i], padded_reach, eroder, options.part_m, set, missed);
+    const bool reaches_down = stacks[i].grounded || stacks[i].bottom <= set.floor;
+    if (reaches_down || !cover.holds(stacks[i]))
+      found[i] = pieces_of(stacks[i], eroded[i], padded_reach, eroder, options.part_m, set, missed);
     failed += missed;
     progress.step();
   });

@@ -126,7 +126,9 @@ Result<Dem> read_dem(const std::filesystem::path& file, const DemCrop& crop,
   if (crop.metres) {
     const auto part = [](double metres, double cell, std::size_t all) {
       const double cells = std::floor(metres / cell + 0.5);
-      return static_cast<std::size_t>(std::clamp(cells, 1.0, std::max(1.0, static_cast<double>(all) - 1))) + 1;
+      return static_cast<std::size_t>(
+                 std::clamp(cells, 1.0, std::max(1.0, static_cast<double>(all) - 1))) +
+             1;
     };
     window.columns = part(crop.metres->x, step->x, width);
     window.rows = part(crop.metres->y, step->y, height);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <utility>
 
 #define XXH_INLINE_ALL
@@ -207,7 +208,13 @@ std::vector<std::byte> SessionTable::answer(Session& session) {
   ++counters_.answers;
 
   const auto start = std::chrono::steady_clock::now();
-  const auto pvs = method_.solve({pose.eye, session.reach});
+  const auto pvs = [&]() -> Result<Pvs> {
+    try {
+      return method_.solve({pose.eye, session.reach});
+    } catch (const std::exception& e) {  // out of memory costs one answer, not the daemon
+      return unsupported(e.what());
+    }
+  }();
   const auto took = std::chrono::steady_clock::now() - start;
 
   wire::PvsMessage m;

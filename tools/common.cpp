@@ -35,13 +35,17 @@ extern "C" void on_interrupt(int) {
 
 int exit_code(const Error& error) {
   switch (error.code) {
-    case ErrorCode::kInvalidArgument: return kUsage;
+    case ErrorCode::kInvalidArgument:
+      return kUsage;
     case ErrorCode::kInput:
     case ErrorCode::kIo:
     case ErrorCode::kMismatch:
-    case ErrorCode::kUnsupported: return kBadInput;
-    case ErrorCode::kConnection: return kNoConnection;
-    case ErrorCode::kCancelled: return kInterrupted;
+    case ErrorCode::kUnsupported:
+      return kBadInput;
+    case ErrorCode::kConnection:
+      return kNoConnection;
+    case ErrorCode::kCancelled:
+      return kInterrupted;
   }
   return kCheckFailed;
 }
@@ -57,8 +61,9 @@ Context make_context(bool quiet) {
     context.progress = [](std::string_view stage, std::size_t done, std::size_t total) {
       constexpr std::size_t kWidth = 30;
       const std::size_t filled = total == 0 ? kWidth : std::min(kWidth, done * kWidth / total);
-      std::cerr << '\r' << stage << " [" << std::string(filled, '#') << std::string(kWidth - filled, '.') << "] " << done << '/'
-                << total << "\x1b[K" << (done >= total ? "\n" : "") << std::flush;
+      std::cerr << '\r' << stage << " [" << std::string(filled, '#')
+                << std::string(kWidth - filled, '.') << "] " << done << '/' << total << "\x1b[K"
+                << (done >= total ? "\n" : "") << std::flush;
     };
   }
   return context;
@@ -69,7 +74,9 @@ CLI::Validator number_within(double least, double most) {
   const auto check = [least, most](const std::string& text) -> std::string {
     double v = 0;
     const auto parsed = std::from_chars(text.data(), text.data() + text.size(), v);
-    if (parsed.ec == std::errc{} && parsed.ptr == text.data() + text.size() && v >= least && v <= most) return "";
+    if (parsed.ec == std::errc{} && parsed.ptr == text.data() + text.size() && v >= least &&
+        v <= most)
+      return "";
     std::ostringstream wrong;
     wrong << "'" << text << "' is not a number from " << least << " to " << most;
     return wrong.str();
@@ -77,9 +84,13 @@ CLI::Validator number_within(double least, double most) {
   return CLI::Validator(check, "NUMBER");
 }
 
-void print(const Json& json) { std::cout << json.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n'; }
+void print(const Json& json) {
+  std::cout << json.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n';
+}
 
-Json to_json(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
+Json to_json(const Vec3& v) {
+  return Json::array({v.x, v.y, v.z});
+}
 
 Result<Vec3> parse_point(const std::string& text) {
   Vec3 p{0};
@@ -88,8 +99,10 @@ Result<Vec3> parse_point(const std::string& text) {
   for (int i = 0; i < 3; ++i) {
     const auto parsed = std::from_chars(at, end, p[i]);
     const bool last = i == 2;
-    if (parsed.ec != std::errc{} || !std::isfinite(p[i]) || (last ? parsed.ptr != end : parsed.ptr == end || *parsed.ptr != ','))
-      return invalid_argument("'" + text + "' is not a point; expected X,Y,Z in metres, as in 10,1.7,-4.5");
+    if (parsed.ec != std::errc{} || !std::isfinite(p[i]) ||
+        (last ? parsed.ptr != end : parsed.ptr == end || *parsed.ptr != ','))
+      return invalid_argument("'" + text +
+                              "' is not a point; expected X,Y,Z in metres, as in 10,1.7,-4.5");
     at = parsed.ptr + (last ? 0 : 1);
   }
   return p;
@@ -97,14 +110,20 @@ Result<Vec3> parse_point(const std::string& text) {
 
 void SceneArgs::add_to(CLI::App& app, bool splits) {
   app.add_option("SCENE", file, "glTF scene, .glb or .gltf")->required();
-  app.add_flag("--honour-sidedness", honour_sidedness, "single-sided triangles do not block from behind (default: all block from both sides)");
+  app.add_flag(
+      "--honour-sidedness", honour_sidedness,
+      "single-sided triangles do not block from behind (default: all block from both sides)");
   if (splits)
-    app.add_option("--granularity", granularity, "object: one object a node or instance; cluster: large meshes are split into compact clusters of triangles")
+    app.add_option("--granularity", granularity,
+                   "object: one object a node or instance; cluster: large meshes are split into "
+                   "compact clusters of triangles")
         ->capture_default_str()
         ->check(CLI::IsMember({"object", "cluster"}));
 }
 
-bool SceneArgs::clustered() const { return granularity == granularity_name(Granularity::kCluster); }
+bool SceneArgs::clustered() const {
+  return granularity == granularity_name(Granularity::kCluster);
+}
 
 Result<Scene> SceneArgs::load(const Context& context) const {
   SceneOptions options;
@@ -112,14 +131,20 @@ Result<Scene> SceneArgs::load(const Context& context) const {
   if (clustered()) options.granularity = Granularity::kCluster;
   auto scene = load_scene(file, options, context);
   if (scene)
-    for (const std::string& w : scene->warnings) context.say("warning: " + w);
+    for (const std::string& w : scene->warnings)
+      context.say("warning: " + w);
   return scene;
 }
 
 void ViewSpaceArgs::add_to(CLI::App& app) {
-  auto* inside_option = app.add_option("--inside", inside, "a point X,Y,Z where observers are; may be given again")->type_name("X,Y,Z")->allow_extra_args(false);
-  auto* path_option = app.add_option("--path", path, "CSV of poses (columns x,y,z) where observers are");
-  auto* outside_option = app.add_flag("--outside", outside, "observers are outside every solid (default)");
+  auto* inside_option =
+      app.add_option("--inside", inside, "a point X,Y,Z where observers are; may be given again")
+          ->type_name("X,Y,Z")
+          ->allow_extra_args(false);
+  auto* path_option =
+      app.add_option("--path", path, "CSV of poses (columns x,y,z) where observers are");
+  auto* outside_option =
+      app.add_flag("--outside", outside, "observers are outside every solid (default)");
   inside_option->excludes(path_option)->excludes(outside_option);
   path_option->excludes(outside_option);
 }
@@ -137,43 +162,69 @@ Result<ViewSpace> ViewSpaceArgs::read() const {
     space.kind = ViewSpace::Kind::kInside;
     const auto poses = read_path(path);
     if (!poses) return poses.error();
-    for (const Pose& pose : *poses) space.seeds.push_back(pose.eye);
+    for (const Pose& pose : *poses)
+      space.seeds.push_back(pose.eye);
   }
   return space;
 }
 
 void SolveArgs::add_to(CLI::App& app, bool reach_required) {
   auto* option = app.add_option("--reach", reach,
-                                "how far the observer can get while an answer is in use: ball:r | disc:r | cylinder:r,h | "
+                                "how far the observer can get while an answer is in use: ball:r | "
+                                "disc:r | cylinder:r,h | "
                                 "ellipsoid:a,b,c | box:a,b,c (metres; h, a, b, c are half-extents)")
                      ->type_name("R");
   if (reach_required) option->required();
   std::string methods;
-  for (const auto& t : method_list()) methods += (methods.empty() ? "" : "; ") + t.name + ": " + t.summary;
+  for (const auto& t : method_list())
+    methods += (methods.empty() ? "" : "; ") + t.name + ": " + t.summary;
   std::vector<std::string> names;
-  for (const auto& t : method_list()) names.push_back(t.name);
-  app.add_option("--method", method, methods)->capture_default_str()->type_name("M")->check(CLI::IsMember(names));
-  app.add_option("--map", map, "sampling of the cull map")->capture_default_str()->check(CLI::IsMember({"polar", "orthographic"}));
-  app.add_option("--backend", backend,
-                 "what the occlusion map is computed on; auto: OpenGL where hardware does it, else the CPU")
+  for (const auto& t : method_list())
+    names.push_back(t.name);
+  app.add_option("--method", method, methods)
+      ->capture_default_str()
+      ->type_name("M")
+      ->check(CLI::IsMember(names));
+  app.add_option("--map", map, "sampling of the cull map")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"polar", "orthographic"}));
+  app.add_option(
+         "--backend", backend,
+         "what the occlusion map is computed on; auto: OpenGL where hardware does it, else the CPU")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "cpu", "gl"}));
-  app.add_option("--occluders", occluders, "shrunk occluders, made by 'ivis shrink' (default: shrink now)")->type_name("F.ivo");
-  app.add_option("--threads", threads, "threads of one solve; the result does not depend on it")->capture_default_str()->check(CLI::Range(1, 256));
-  app.add_option("--max-occluders", max_occluders, "draw only the N occluders of largest projected area; 0: all that show")->capture_default_str()->check(CLI::NonNegativeNumber);
-  app.add_option("--map-pixels", map_pixels, "pixels a side of the occlusion map's six faces, a multiple of 16 from 64 to 4096: more hide more and cost more "
+  app.add_option("--occluders", occluders,
+                 "shrunk occluders, made by 'ivis shrink' (default: shrink now)")
+      ->type_name("F.ivo");
+  app.add_option("--threads", threads, "threads of one solve; the result does not depend on it")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 256));
+  app.add_option("--max-occluders", max_occluders,
+                 "draw only the N occluders of largest projected area; 0: all that show")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--map-pixels", map_pixels,
+                 "pixels a side of the occlusion map's six faces, a multiple of 16 from 64 to "
+                 "4096: more hide more and cost more "
                  "(default: 512, or 1024 for reaches below 0.5 m)")
-      ->check([](const std::string& text) -> std::string {
-        std::string value = text;
-        const std::string wrong = number_within(64, 4096)(value);
-        if (!wrong.empty()) return wrong;
-        return std::stod(text) == 16 * std::floor(std::stod(text) / 16) ? "" : "'" + text + "' is not a multiple of 16";
-      }, "PIXELS");
+      ->check(
+          [](const std::string& text) -> std::string {
+            std::string value = text;
+            const std::string wrong = number_within(64, 4096)(value);
+            if (!wrong.empty()) return wrong;
+            return std::stod(text) == 16 * std::floor(std::stod(text) / 16)
+                       ? ""
+                       : "'" + text + "' is not a multiple of 16";
+          },
+          "PIXELS");
   app.add_option("--frustum", frustum,
-                 "list only what can be in the picture: yaw,pitch,fov_x,fov_y,turn in degrees; yaw 0 looks along +X, 90 along -Z; full "
+                 "list only what can be in the picture: yaw,pitch,fov_x,fov_y,turn in degrees; yaw "
+                 "0 looks along +X, 90 along -Z; full "
                  "angles of view; turn: how far the view may turn while an answer is in use")
       ->type_name("YAW,PITCH,FOV_X,FOV_Y,TURN");
-  app.add_option("--reference-rays", rays, "aimed rays an object of the method 'reference'")->capture_default_str()->check(CLI::Range(1, 1000000));
+  app.add_option("--reference-rays", rays, "aimed rays an object of the method 'reference'")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000));
 }
 
 Status check_input_file(const std::filesystem::path& file) {
@@ -214,7 +265,9 @@ Status check_output_folder(const std::filesystem::path& folder) {
   return ok();
 }
 
-Result<Reach> SolveArgs::parse_reach() const { return Reach::parse(reach); }
+Result<Reach> SolveArgs::parse_reach() const {
+  return Reach::parse(reach);
+}
 
 Result<std::optional<Frustum>> SolveArgs::parse_frustum() const {
   if (frustum.empty()) return std::optional<Frustum>();
@@ -227,7 +280,8 @@ Status SolveArgs::check_files() const {
   return occluders.empty() ? ok() : check_input_file(occluders);
 }
 
-Result<OccluderSet> SolveArgs::get_occluders(const Scene& scene, const Reach& wanted, const Context& context) const {
+Result<OccluderSet> SolveArgs::get_occluders(const Scene& scene, const Reach& wanted,
+                                             const Context& context) const {
   if (occluders.empty()) {
     ShrinkOptions options;
     options.reach = wanted;
@@ -282,7 +336,7 @@ Result<std::unique_ptr<Prepared>> prepare(const SceneArgs& scene, const SolveArg
 
 double percentile(std::vector<double> values, double p) {
   if (values.empty()) return 0;
-  const auto at = static_cast<std::size_t>(std::ceil(p * static_cast<double>(values.size()))) ;
+  const auto at = static_cast<std::size_t>(std::ceil(p * static_cast<double>(values.size())));
   const std::size_t k = std::min(values.size() - 1, at == 0 ? 0 : at - 1);
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
   return values[k];

@@ -24,17 +24,26 @@ namespace ivis::tool {
 
 using Json = nlohmann::ordered_json;
 
-enum Exit { kOk = 0, kCheckFailed = 1, kUsage = 2, kBadInput = 3, kNoConnection = 4, kInterrupted = 130 };
+enum Exit {
+  kOk = 0,
+  kCheckFailed = 1,
+  kUsage = 2,
+  kBadInput = 3,
+  kNoConnection = 4,
+  kInterrupted = 130
+};
 
 /// Accepts numbers from `least` to `most`; CLI::Range lets what is not a number pass.
 CLI::Validator number_within(double least, double most);
 
-/// What a subcommand's action ends with: an exit code, or an error that is printed and mapped to one.
+/// What a subcommand's action ends with: an exit code, or an error that is printed and mapped to
+/// one.
 using Outcome = Result<int>;
 
 int exit_code(const Error& error);
 
-/// Progress bar on a terminal's standard error, Ctrl-C as Context::stop, log lines to standard error.
+/// Progress bar on a terminal's standard error, Ctrl-C as Context::stop, log lines to standard
+/// error.
 Context make_context(bool quiet);
 
 void print(const Json& json);
@@ -89,7 +98,8 @@ struct SolveArgs {
   /// Of what needs no scene. Errors: kIo.
   Status check_files() const;
   /// The occluder file, or the scene shrunk here and now by the fast builder.
-  Result<OccluderSet> get_occluders(const Scene& scene, const Reach& reach, const Context& context) const;
+  Result<OccluderSet> get_occluders(const Scene& scene, const Reach& reach,
+                                    const Context& context) const;
   Result<std::unique_ptr<Method>> make(const Scene& scene, const OccluderSet& set,
                                        const Context& context) const;
 };

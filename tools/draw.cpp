@@ -19,7 +19,8 @@ struct DrawArgs {
   double radius = 250;
 };
 
-/// What lies before the first shrunk wall that rises above the eye, all round: the lit part of the ground plane.
+/// What lies before the first shrunk wall that rises above the eye, all round: the lit part of the
+/// ground plane.
 Polygon lit(const OccluderSet& set, const Vec3& apex, double far) {
   constexpr int kRays = 2880;
   std::vector<double> reach(kRays, far);
@@ -53,13 +54,16 @@ Polygon lit(const OccluderSet& set, const Vec3& apex, double far) {
   Polygon polygon{{{}}};
   for (int k = 0; k < kRays; ++k) {
     const double angle = 2 * std::numbers::pi * k / kRays;
-    polygon.rings[0].push_back(eye + reach[static_cast<std::size_t>(k)] * Vec2{std::cos(angle), std::sin(angle)});
+    polygon.rings[0].push_back(eye + reach[static_cast<std::size_t>(k)] *
+                                         Vec2{std::cos(angle), std::sin(angle)});
   }
   return polygon;
 }
 
 Outcome draw(const DrawArgs& args) {
-  if (args.out.extension() != ".svg") return invalid_argument("'" + args.out.string() + "': pictures are SVG, expected a name that ends in .svg");
+  if (args.out.extension() != ".svg")
+    return invalid_argument("'" + args.out.string() +
+                            "': pictures are SVG, expected a name that ends in .svg");
   const auto reach = args.solve.parse_reach();
   if (!reach) return reach.error();
   const auto eye = parse_point(args.eye);
@@ -73,23 +77,30 @@ Outcome draw(const DrawArgs& args) {
 
   Picture picture(ground(*eye), args.radius);
   std::ostringstream head;
-  head << "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" << kPixels << "\" height=\"" << kPixels + 60 << "\" viewBox=\"0 0 " << kPixels << ' '
-       << kPixels + 60 << "\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n<svg width=\"" << kPixels << "\" height=\"" << kPixels
+  head << "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" << kPixels << "\" height=\""
+       << kPixels + 60 << "\" viewBox=\"0 0 " << kPixels << ' ' << kPixels + 60
+       << "\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n<svg width=\"" << kPixels
+       << "\" height=\"" << kPixels
        << "\">\n<rect width=\"100%\" height=\"100%\" fill=\"#8d93a8\"/>\n";
   picture.raw(head.str());
   const Vec3 apex = *eye + Vec3{0, padded(*reach, occluders.slack_m).half_extents().y, 0};
   picture.polygon(lit(occluders, apex, 4 * args.radius), "fill=\"#f4f1e6\"");
   for (const Prism& p : occluders.solids)
-    if (picture.sees(p.bounds())) picture.polygon(p.footprint, "fill=\"#c9b79c\" fill-opacity=\"0.8\" stroke=\"#6b5b45\" stroke-width=\"0.6\"");
+    if (picture.sees(p.bounds()))
+      picture.polygon(
+          p.footprint,
+          "fill=\"#c9b79c\" fill-opacity=\"0.8\" stroke=\"#6b5b45\" stroke-width=\"0.6\"");
   for (const Prism& p : occluders.shrunk)
-    if (picture.sees(p.bounds())) picture.polygon(p.footprint, "fill=\"#4a4238\" fill-opacity=\"0.75\"");
+    if (picture.sees(p.bounds()))
+      picture.polygon(p.footprint, "fill=\"#4a4238\" fill-opacity=\"0.75\"");
   std::size_t drawn = 0;
   for (const ObjectId id : pvs->objects) {
     const Object& o = scene.objects[id];
     if (!picture.sees(o.bounds)) continue;
     const Vec3 size = o.bounds.size();
     const bool large = std::max(size.x, size.z) > 8;
-    picture.box(o.bounds, large ? "fill=\"none\" stroke=\"#1f7a3d\" stroke-width=\"0.8\"" : "fill=\"#1f9a4d\"");
+    picture.box(o.bounds, large ? "fill=\"none\" stroke=\"#1f7a3d\" stroke-width=\"0.8\""
+                                : "fill=\"#1f9a4d\"");
     ++drawn;
   }
   std::ostringstream tail;
@@ -116,13 +127,16 @@ Outcome draw(const DrawArgs& args) {
 }  // namespace
 
 void add_draw(CLI::App& app, std::function<Outcome()>& action) {
-  CLI::App* sub = app.add_subcommand("draw", "a picture (SVG) from above of one pose: occluders, shrunk occluders, shadow, PVS");
+  CLI::App* sub = app.add_subcommand(
+      "draw", "a picture (SVG) from above of one pose: occluders, shrunk occluders, shadow, PVS");
   auto args = std::make_shared<DrawArgs>();
   args->scene.add_to(*sub);
   args->solve.add_to(*sub, true);
   sub->add_option("--eye", args->eye, "the observer's eye")->required()->type_name("X,Y,Z");
   sub->add_option("-o,--output", args->out, "picture to write")->required()->type_name("OUT.svg");
-  sub->add_option("--radius", args->radius, "metres shown each way from the eye")->capture_default_str()->check(number_within(1, 100000));
+  sub->add_option("--radius", args->radius, "metres shown each way from the eye")
+      ->capture_default_str()
+      ->check(number_within(1, 100000));
   sub->callback([&action, args] { action = [args] { return draw(*args); }; });
 }
 

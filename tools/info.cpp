@@ -30,17 +30,18 @@ Outcome info(const InfoArgs& args) {
   const Vec3 size = scene->bounds.size();
   std::cout << "objects     " << scene->objects.size();
   if (args.scene.clustered()) std::cout << "  (clusters of " << sources(*scene).size() << ")";
-  std::cout << "\ntriangles   " << scene->triangle_count
-            << "\nonly-occluders " << scene->hidden_solids.size() << "\nbounds      "
-            << to_json(scene->bounds.lo).dump() << " .. " << to_json(scene->bounds.hi).dump()
-            << "  (" << size.x << " x " << size.y << " x " << size.z << " m)\nhash        "
-            << to_hex(scene->hash) << "\nextensions ";
-  for (const auto& e : scene->extensions) std::cout << ' ' << e;
+  std::cout << "\ntriangles   " << scene->triangle_count << "\nonly-occluders "
+            << scene->hidden_solids.size() << "\nbounds      " << to_json(scene->bounds.lo).dump()
+            << " .. " << to_json(scene->bounds.hi).dump() << "  (" << size.x << " x " << size.y
+            << " x " << size.z << " m)\nhash        " << to_hex(scene->hash) << "\nextensions ";
+  for (const auto& e : scene->extensions)
+    std::cout << ' ' << e;
   std::cout << '\n';
   return kOk;
 }
 
-/// The numbers that an object's triangles have in the mesh of its node. To be asked by ascending id.
+/// The numbers that an object's triangles have in the mesh of its node. To be asked by ascending
+/// id.
 class WholeTriangles {
  public:
   explicit WholeTriangles(const Scene& scene) : scene_(scene) {}
@@ -97,7 +98,8 @@ Outcome objects(const InfoArgs& args) {
   return kOk;
 }
 
-std::shared_ptr<InfoArgs> add(CLI::App& app, std::function<Outcome()>& action, const char* name, const char* help, Outcome (*run)(const InfoArgs&)) {
+std::shared_ptr<InfoArgs> add(CLI::App& app, std::function<Outcome()>& action, const char* name,
+                              const char* help, Outcome (*run)(const InfoArgs&)) {
   CLI::App* sub = app.add_subcommand(name, help);
   auto args = std::make_shared<InfoArgs>();
   args->scene.add_to(*sub);
@@ -108,10 +110,17 @@ std::shared_ptr<InfoArgs> add(CLI::App& app, std::function<Outcome()>& action, c
 
 }  // namespace
 
-void add_info(CLI::App& app, std::function<Outcome()>& action) { add(app, action, "info", "what a scene file holds", info); }
+void add_info(CLI::App& app, std::function<Outcome()>& action) {
+  add(app, action, "info", "what a scene file holds", info);
+}
 void add_objects(CLI::App& app, std::function<Outcome()>& action) {
-  const auto args = add(app, action, "objects", "the objects of a scene, by id: one a mesh-bearing node or instance, or a cluster of its triangles", objects);
-  app.get_subcommand("objects")->add_flag("--triangle-numbers", args->triangles, "with --json: which triangles of its node's mesh an object has, numbered through all primitives");
+  const auto args = add(app, action, "objects",
+                        "the objects of a scene, by id: one a mesh-bearing node or instance, or a "
+                        "cluster of its triangles",
+                        objects);
+  app.get_subcommand("objects")->add_flag("--triangle-numbers", args->triangles,
+                                          "with --json: which triangles of its node's mesh an "
+                                          "object has, numbered through all primitives");
 }
 
 }  // namespace ivis::tool

@@ -33,7 +33,8 @@ Result<Timed> timed_solve(const Method& method, const ViewCell& cell) {
   return Timed{std::move(*pvs), cpu_ms, wall_ms.count()};
 }
 
-Outcome one_eye(const PvsArgs& args, const Scene& scene, const Method& method, const ViewCell& cell) {
+Outcome one_eye(const PvsArgs& args, const Scene& scene, const Method& method,
+                const ViewCell& cell) {
   // Once to warm caches and take memory, once to time.
   if (auto warm = method.solve(cell); !warm) return warm.error();
   const auto t = timed_solve(method, cell);
@@ -41,16 +42,20 @@ Outcome one_eye(const PvsArgs& args, const Scene& scene, const Method& method, c
   const MethodTraits& traits = method.traits();
   const char* guarantee = to_string(traits.guarantee);
   if (args.json) {
-    Json j{{"method", traits.name}, {"guarantee", guarantee}, {"objects", t->pvs.objects}, {"count", t->pvs.objects.size()},
-           {"total", scene.objects.size()}, {"compute_ms", t->compute_ms}, {"wall_ms", t->wall_ms},
-           {"backend", to_string(method.backend())}};
+    Json j{{"method", traits.name},         {"guarantee", guarantee},
+           {"objects", t->pvs.objects},     {"count", t->pvs.objects.size()},
+           {"total", scene.objects.size()}, {"compute_ms", t->compute_ms},
+           {"wall_ms", t->wall_ms},         {"backend", to_string(method.backend())}};
     if (!t->pvs.everything_because.empty()) j["everything_because"] = t->pvs.everything_because;
     print(j);
     return kOk;
   }
-  std::cout << t->pvs.objects.size() << " of " << scene.objects.size() << " objects can be seen from " << cell.reach.to_string()
-            << " about " << to_json(cell.eye).dump() << "  (" << traits.name << ", " << guarantee << ", " << t->compute_ms << " ms)\n";
-  if (!t->pvs.everything_because.empty()) std::cout << "everything is listed: " << t->pvs.everything_because << '\n';
+  std::cout << t->pvs.objects.size() << " of " << scene.objects.size()
+            << " objects can be seen from " << cell.reach.to_string() << " about "
+            << to_json(cell.eye).dump() << "  (" << traits.name << ", " << guarantee << ", "
+            << t->compute_ms << " ms)\n";
+  if (!t->pvs.everything_because.empty())
+    std::cout << "everything is listed: " << t->pvs.everything_because << '\n';
   return kOk;
 }
 
@@ -83,14 +88,18 @@ Outcome along_path(const PvsArgs& args, const std::vector<Pose>& path, const Sce
                      {"compute_ms", t->compute_ms}});
     if (!args.dump.empty()) {
       std::string ids;
-      for (const ObjectId id : t->pvs.objects) ids += std::to_string(id) + '\n';
+      for (const ObjectId id : t->pvs.objects)
+        ids += std::to_string(id) + '\n';
       if (auto s = write_file_whole(args.dump / row_name(row), ids); !s) return s.error();
     }
     context.report("poses", row + 1, path.size());
   }
   if (args.json) {
-    print({{"poses", poses}, {"count_median", median(counts)}, {"compute_ms_median", median(compute)},
-           {"compute_ms_p99", percentile(compute, 0.99)}, {"wall_ms_median", median(wall)},
+    print({{"poses", poses},
+           {"count_median", median(counts)},
+           {"compute_ms_median", median(compute)},
+           {"compute_ms_p99", percentile(compute, 0.99)},
+           {"wall_ms_median", median(wall)},
            {"backend", to_string(method.backend())}});
     return kOk;
   }
@@ -131,13 +140,24 @@ Outcome run_pvs(const PvsArgs& args) {
 }  // namespace
 
 void add_pvs(CLI::App& app, std::function<Outcome()>& action) {
-  CLI::App* sub = app.add_subcommand("pvs", "the objects that can be seen from anywhere within reach of an eye, or of each pose of a path");
+  CLI::App* sub = app.add_subcommand("pvs",
+                                     "the objects that can be seen from anywhere within reach of "
+                                     "an eye, or of each pose of a path");
   auto args = std::make_shared<PvsArgs>();
   args->scene.add_to(*sub);
   args->solve.add_to(*sub, true);
-  auto* eye = sub->add_option("--eye", args->eyes, "the observer's eye; given again, one set that serves all eyes, each within the reach")->type_name("X,Y,Z")->allow_extra_args(false);
-  auto* path = sub->add_option("--path", args->path, "CSV of poses: columns x,y,z by name")->excludes(eye);
-  sub->add_option("--dump", args->dump, "write each pose's ids, one a line, to DIR/00000.txt, DIR/00001.txt, ...")->type_name("DIR")->needs(path);
+  auto* eye =
+      sub->add_option(
+             "--eye", args->eyes,
+             "the observer's eye; given again, one set that serves all eyes, each within the reach")
+          ->type_name("X,Y,Z")
+          ->allow_extra_args(false);
+  auto* path =
+      sub->add_option("--path", args->path, "CSV of poses: columns x,y,z by name")->excludes(eye);
+  sub->add_option("--dump", args->dump,
+                  "write each pose's ids, one a line, to DIR/00000.txt, DIR/00001.txt, ...")
+      ->type_name("DIR")
+      ->needs(path);
   sub->add_flag("--json", args->json, "print JSON");
   sub->callback([&action, args] {
     if (args->eyes.empty() && args->path.empty()) throw CLI::RequiredError("--eye or --path");

@@ -37,14 +37,22 @@ class Summary {
   int report(bool json) const {
     if (json) {
       Json missing = Json::array();
-      for (const Miss& m : missing_) missing.push_back({{"id", m.id}, {"eye", to_json(m.eye)}, {"hit", to_json(m.hit)}});
-      print({{"rays", rays_}, {"false_negatives", false_negatives_}, {"missing", missing}, {"pvs_median", median(pvs_)},
-             {"seen_median", median(seen_)}, {"overestimate", median(ratio_)}});
-    } else {
-      std::cout << pvs_.size() << " cells, " << rays_ << " rays at culled objects: " << false_negatives_ << " objects missed; median PVS "
-                << median(pvs_) << ", seen by rays " << median(seen_) << ", ratio " << median(ratio_) << '\n';
       for (const Miss& m : missing_)
-        std::cout << "  missed: object " << m.id << " from " << to_json(m.eye).dump() << " at " << to_json(m.hit).dump() << '\n';
+        missing.push_back({{"id", m.id}, {"eye", to_json(m.eye)}, {"hit", to_json(m.hit)}});
+      print({{"rays", rays_},
+             {"false_negatives", false_negatives_},
+             {"missing", missing},
+             {"pvs_median", median(pvs_)},
+             {"seen_median", median(seen_)},
+             {"overestimate", median(ratio_)}});
+    } else {
+      std::cout << pvs_.size() << " cells, " << rays_
+                << " rays at culled objects: " << false_negatives_ << " objects missed; median PVS "
+                << median(pvs_) << ", seen by rays " << median(seen_) << ", ratio "
+                << median(ratio_) << '\n';
+      for (const Miss& m : missing_)
+        std::cout << "  missed: object " << m.id << " from " << to_json(m.eye).dump() << " at "
+                  << to_json(m.hit).dump() << '\n';
     }
     return false_negatives_ > 0 ? kCheckFailed : kOk;
   }
@@ -62,7 +70,9 @@ Context without_progress(Context context) {
   return context;
 }
 
-BlockerChoice blockers(const VerifyArgs& args) { return args.strict ? BlockerChoice::kOccluding : BlockerChoice::kDrawn; }
+BlockerChoice blockers(const VerifyArgs& args) {
+  return args.strict ? BlockerChoice::kOccluding : BlockerChoice::kDrawn;
+}
 
 VerifyOptions verify_options(const VerifyArgs& args) {
   VerifyOptions options;
@@ -106,11 +116,14 @@ Outcome verify_record(const VerifyArgs& args, const Context& context) {
   if (scene->hash != record->scene_hash)
     return mismatch("'" + args.record.string() + "' was recorded with scene " +
                     to_hex(record->scene_hash) + ", '" + args.scene.file.string() + "' is " +
-                    to_hex(scene->hash) + " (another file, or the same with another --granularity)");
+                    to_hex(scene->hash) +
+                    " (another file, or the same with another --granularity)");
   if (scene->objects.size() != record->objects)
-    return input_error("'" + args.record.string() + "' is of " + std::to_string(record->objects) + " objects, the scene has " +
-                       std::to_string(scene->objects.size()));
-  if (record->frames.empty()) return input_error("'" + args.record.string() + "' holds no frame, so there is nothing to verify");
+    return input_error("'" + args.record.string() + "' is of " + std::to_string(record->objects) +
+                       " objects, the scene has " + std::to_string(scene->objects.size()));
+  if (record->frames.empty())
+    return input_error("'" + args.record.string() +
+                       "' holds no frame, so there is nothing to verify");
   const auto occluders = args.solve.get_occluders(*scene, record->reach, context);
   if (!occluders) return occluders.error();
   const Verifier verifier(*scene, &*occluders, blockers(args));
@@ -126,7 +139,8 @@ Outcome verify_record(const VerifyArgs& args, const Context& context) {
     const auto report = verifier.check(pvs, verify_options(args), without_progress(context));
     if (!report) return report.error();
     summary.add(*report);
-    context.report("verify", std::min(row + args.stride, record->frames.size()), record->frames.size());
+    context.report("verify", std::min(row + args.stride, record->frames.size()),
+                   record->frames.size());
   }
   return summary.report(args.json);
 }
@@ -139,16 +153,27 @@ Outcome run_verify(const VerifyArgs& args) {
 }  // namespace
 
 void add_verify(CLI::App& app, std::function<Outcome()>& action) {
-  CLI::App* sub = app.add_subcommand("verify", "shoot rays at what a PVS leaves out; exit code 1 if one arrives");
+  CLI::App* sub = app.add_subcommand(
+      "verify", "shoot rays at what a PVS leaves out; exit code 1 if one arrives");
   auto args = std::make_shared<VerifyArgs>();
   args->scene.add_to(*sub);
   args->solve.add_to(*sub, false);
   auto* path = sub->add_option("--path", args->path, "CSV of poses; needs --reach");
-  sub->add_option("--record", args->record, "what a client was told, recorded by 'ivis walk --record'")->excludes(path);
-  sub->add_option("--rays", args->rays, "aimed rays a culled object")->capture_default_str()->check(CLI::Range(1, 1000000));
-  sub->add_option("--stride", args->stride, "every K-th pose")->capture_default_str()->check(CLI::Range(1, 1000000000));
-  sub->add_flag("--strict", args->strict, "see through nodes tagged 'never', which no method takes as occluders: finds more, proves more");
-  sub->add_option("--seed", args->seed, "of the rays")->capture_default_str()->check(CLI::NonNegativeNumber);
+  sub->add_option("--record", args->record,
+                  "what a client was told, recorded by 'ivis walk --record'")
+      ->excludes(path);
+  sub->add_option("--rays", args->rays, "aimed rays a culled object")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000));
+  sub->add_option("--stride", args->stride, "every K-th pose")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000000));
+  sub->add_flag("--strict", args->strict,
+                "see through nodes tagged 'never', which no method takes as occluders: finds more, "
+                "proves more");
+  sub->add_option("--seed", args->seed, "of the rays")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
   sub->add_flag("--json", args->json, "print JSON");
   sub->callback([&action, args] {
     if (args->path.empty() && args->record.empty()) throw CLI::RequiredError("--path or --record");

@@ -36,7 +36,8 @@ class Builder {
   std::uint32_t build(std::size_t first, std::size_t last) {
     // Capacity of a child so that all but the last are full.
     std::size_t capacity = 1;
-    while (capacity * BoxTree::kWidth < last - first) capacity *= BoxTree::kWidth;
+    while (capacity * BoxTree::kWidth < last - first)
+      capacity *= BoxTree::kWidth;
     std::vector<std::pair<std::size_t, std::size_t>> groups;
     split(first, last, capacity, groups);
     IVIS_ASSERT(groups.size() <= BoxTree::kWidth, "a node holds at most kWidth children");
@@ -47,7 +48,8 @@ class Builder {
       Aabb box;
       if (g < groups.size()) {
         const auto [a, b] = groups[g];
-        for (std::size_t i = a; i < b; ++i) box.add(entries_[i].box);
+        for (std::size_t i = a; i < b; ++i)
+          box.add(entries_[i].box);
         child = b - a == 1 ? BoxTree::kItem | entries_[a].item : build(a, b);
       } else {
         box = {Vec3{0}, Vec3{0}};
@@ -89,7 +91,8 @@ class Builder {
       for (std::size_t i = n; i-- > 1;) {
         box.add(entries_[first + i].box);
         if (i % capacity != 0) continue;
-        const double cost = left[i - 1] * static_cast<double>(i) + half_area(box) * static_cast<double>(n - i);
+        const double cost =
+            left[i - 1] * static_cast<double>(i) + half_area(box) * static_cast<double>(n - i);
         if (cost < best_cost) {
           best_cost = cost;
           best_axis = axis;
@@ -103,9 +106,11 @@ class Builder {
   }
 
   void sort(std::size_t first, std::size_t last, int axis) {
-    std::sort(entries_.begin() + static_cast<std::ptrdiff_t>(first), entries_.begin() + static_cast<std::ptrdiff_t>(last),
+    std::sort(entries_.begin() + static_cast<std::ptrdiff_t>(first),
+              entries_.begin() + static_cast<std::ptrdiff_t>(last),
               [axis](const Entry& a, const Entry& b) {
-                return a.centre[axis] != b.centre[axis] ? a.centre[axis] < b.centre[axis] : a.item < b.item;
+                return a.centre[axis] != b.centre[axis] ? a.centre[axis] < b.centre[axis]
+                                                        : a.item < b.item;
               });
   }
 
@@ -115,14 +120,16 @@ class Builder {
 
 }  // namespace
 
-BoxTree BoxTree::build(std::span<const Aabb> boxes, std::span<const std::uint32_t> items, const Vec3& tree_origin) {
+BoxTree BoxTree::build(std::span<const Aabb> boxes, std::span<const std::uint32_t> items,
+                       const Vec3& tree_origin) {
   IVIS_ASSERT(boxes.size() == items.size() && boxes.size() < kItem, "one name a box");
   BoxTree tree;
   tree.origin = tree_origin;
   if (boxes.empty()) return tree;
   std::vector<Entry> entries;
   entries.reserve(boxes.size());
-  for (std::size_t i = 0; i < boxes.size(); ++i) entries.push_back({boxes[i], boxes[i].centre(), items[i]});
+  for (std::size_t i = 0; i < boxes.size(); ++i)
+    entries.push_back({boxes[i], boxes[i].centre(), items[i]});
   Builder(entries, tree).build(0, entries.size());
   return tree;
 }

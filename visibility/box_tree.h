@@ -9,8 +9,8 @@
 
 namespace ivis {
 
-/// A 16-wide hierarchy of boxes, full nodes, structure of arrays: one node is tested with one vector
-/// instruction a step. Boxes are single precision relative to `origin`, rounded outwards.
+/// A 16-wide hierarchy of boxes, full nodes, structure of arrays: one node is tested with one
+/// vector instruction a step. Boxes are single precision relative to `origin`, rounded outwards.
 /// Threads: read-only after build.
 struct BoxTree {
   static constexpr std::uint32_t kWidth = 16;
@@ -26,7 +26,8 @@ struct BoxTree {
   std::vector<Node> nodes;  ///< nodes[0] is the root; empty when there is no item
 
   /// `items[i]` names box `boxes[i]`. Cost: O(n log² n). Relative to `tree_origin`.
-  static BoxTree build(std::span<const Aabb> boxes, std::span<const std::uint32_t> items, const Vec3& tree_origin);
+  static BoxTree build(std::span<const Aabb> boxes, std::span<const std::uint32_t> items,
+                       const Vec3& tree_origin);
 };
 
 }  // namespace ivis

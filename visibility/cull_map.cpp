@@ -9,17 +9,17 @@
 
 #include "visibility/answer.h"
 
-
 namespace ivis {
 namespace {
 
 constexpr double kSquareM = 4;  ///< of the orthographic map
 
-/// Boxes are subtracted from the eye in single precision: how far the rounded eye may be from the true one.
-/// The occluders' slack pays for it (core/view_cell.h, padded).
+/// Boxes are subtracted from the eye in single precision: how far the rounded eye may be from the
+/// true one. The occluders' slack pays for it (core/view_cell.h, padded).
 bool eye_fits_single_precision(const Vec3& eye, double slack_m) {
   for (int i = 0; i < 3; ++i)
-    if (std::abs(eye[i] - static_cast<double>(static_cast<float>(eye[i]))) > 0.5 * slack_m) return false;
+    if (std::abs(eye[i] - static_cast<double>(static_cast<float>(eye[i]))) > 0.5 * slack_m)
+      return false;
   return true;
 }
 
@@ -32,7 +32,8 @@ WallSet make_walls(const OccluderSet& occluders, const Vec3& origin) {
     solid.first_ring = static_cast<std::uint32_t>(walls.rings.size());
     for (const auto& ring : prism.footprint.rings) {
       if (ring.size() < 3) continue;
-      walls.rings.push_back({static_cast<std::uint32_t>(walls.x.size()), static_cast<std::uint32_t>(ring.size())});
+      walls.rings.push_back(
+          {static_cast<std::uint32_t>(walls.x.size()), static_cast<std::uint32_t>(ring.size())});
       ++solid.rings;
       for (const Vec2& p : ring) {
         walls.x.push_back(static_cast<float>(p.x - origin.x));
@@ -72,8 +73,8 @@ struct CullMap::Scratch {
   std::vector<std::uint64_t> bits;
 };
 
-CullMap::CullMap(const Scene& scene, const OccluderSet& occluders, const MethodOptions& options, const PolarGuards& guards,
-                 std::uint32_t bins_a_face)
+CullMap::CullMap(const Scene& scene, const OccluderSet& occluders, const MethodOptions& options,
+                 const PolarGuards& guards, std::uint32_t bins_a_face)
     : scene_(scene),
       occluders_(occluders),
       options_(options),
@@ -144,7 +145,8 @@ Result<Pvs> CullMap::solve(const ViewCell& cell, Stats& stats) const {
   const Vec3 half = padded(cell.reach, occluders_.slack_m).half_extents();
   Eye eye;
   eye.apex = cell.eye + Vec3{0, half.y, 0} - origin_;
-  for (int i = 0; i < 3; ++i) eye.single[i] = static_cast<float>(eye.apex[i]);
+  for (int i = 0; i < 3; ++i)
+    eye.single[i] = static_cast<float>(eye.apex[i]);
   const char* why = nullptr;
   if (solids_.holds(cell.eye)) {
     why = "eye inside an occluder";
@@ -158,9 +160,10 @@ Result<Pvs> CullMap::solve(const ViewCell& cell, Stats& stats) const {
   const Aabb box{cell.eye - half, cell.eye + half};
   eye.floors.above_floor = box.lo.y >= occluders_.floor;
   const Aabb& ground = occluders_.ground;
-  eye.floors.on_ground = !ground.empty() && box.lo.x >= ground.lo.x && box.hi.x <= ground.hi.x && box.lo.z >= ground.lo.z &&
-                         box.hi.z <= ground.hi.z;
-  const bool down = (eye.floors.above_floor && all_floored_) || (eye.floors.on_ground && all_grounded_) ||
+  eye.floors.on_ground = !ground.empty() && box.lo.x >= ground.lo.x && box.hi.x <= ground.hi.x &&
+                         box.lo.z >= ground.lo.z && box.hi.z <= ground.hi.z;
+  const bool down = (eye.floors.above_floor && all_floored_) ||
+                    (eye.floors.on_ground && all_grounded_) ||
                     (eye.floors.above_floor && eye.floors.on_ground && all_held_down_);
   eye.floors.undersides = !down;
   stats.undersides = down ? 0 : 1;
@@ -177,7 +180,8 @@ Result<Pvs> CullMap::solve(const ViewCell& cell, Stats& stats) const {
   return pvs;
 }
 
-/// The options_.max_occluders solids of largest projected area (width times height over distance squared), near ones first.
+/// The options_.max_occluders solids of largest projected area (width times height over distance
+/// squared), near ones first.
 std::vector<std::uint32_t> CullMap::largest_solids(const Eye& eye) const {
   std::vector<std::uint32_t> chosen;
   if (options_.max_occluders == 0 || options_.max_occluders >= walls_.solids.size()) return chosen;
@@ -191,18 +195,27 @@ std::vector<std::uint32_t> CullMap::largest_solids(const Eye& eye) const {
     for (std::uint32_t c = 0; c < node.count; ++c) {
       if ((node.child[c] & BoxTree::kItem) == 0) continue;
       const auto at = [](float v) { return static_cast<double>(v); };
-      const double dx = std::max({at(node.lo_x[c]) - eye.apex.x, eye.apex.x - at(node.hi_x[c]), 0.0});
-      const double dz = std::max({at(node.lo_z[c]) - eye.apex.z, eye.apex.z - at(node.hi_z[c]), 0.0});
+      const double dx =
+          std::max({at(node.lo_x[c]) - eye.apex.x, eye.apex.x - at(node.hi_x[c]), 0.0});
+      const double dz =
+          std::max({at(node.lo_z[c]) - eye.apex.z, eye.apex.z - at(node.hi_z[c]), 0.0});
       const double d = std::max(std::hypot(dx, dz), 0.1);
-      const double width = std::hypot(at(node.hi_x[c]) - at(node.lo_x[c]), at(node.hi_z[c]) - at(node.lo_z[c]));
-      all.push_back({width * (at(node.hi_y[c]) - at(node.lo_y[c])) / (d * d), d, node.child[c] & ~BoxTree::kItem});
+      const double width =
+          std::hypot(at(node.hi_x[c]) - at(node.lo_x[c]), at(node.hi_z[c]) - at(node.lo_z[c]));
+      all.push_back({width * (at(node.hi_y[c]) - at(node.lo_y[c])) / (d * d), d,
+                     node.child[c] & ~BoxTree::kItem});
     }
-  const auto larger = [](const Candidate& a, const Candidate& b) { return a.area != b.area ? a.area > b.area : a.solid < b.solid; };
-  const auto nearer = [](const Candidate& a, const Candidate& b) { return a.distance != b.distance ? a.distance < b.distance : a.solid < b.solid; };
+  const auto larger = [](const Candidate& a, const Candidate& b) {
+    return a.area != b.area ? a.area > b.area : a.solid < b.solid;
+  };
+  const auto nearer = [](const Candidate& a, const Candidate& b) {
+    return a.distance != b.distance ? a.distance < b.distance : a.solid < b.solid;
+  };
   const auto end = all.begin() + static_cast<std::ptrdiff_t>(options_.max_occluders);
   std::nth_element(all.begin(), end, all.end(), larger);
   std::sort(all.begin(), end, nearer);
-  for (auto it = all.begin(); it != end; ++it) chosen.push_back(it->solid);
+  for (auto it = all.begin(); it != end; ++it)
+    chosen.push_back(it->solid);
   return chosen;
 }
 
@@ -213,11 +226,13 @@ void CullMap::find_polar(const Eye& eye, Scratch& scratch, Stats& stats) const {
     terrain_->draw(eye.single, scratch.horizon);
     if (!scratch.horizon.empty()) scratch.polar.set_horizon(&scratch.horizon);
   }
-  draw_walls(walls_, eye.single, eye.floors, largest_solids(eye), guards_, scratch.polar, stats.polar);
+  draw_walls(walls_, eye.single, eye.floors, largest_solids(eye), guards_, scratch.polar,
+             stats.polar);
   scratch.polar.finish(eye.floors.undersides);
   if (objects_.nodes.empty()) return;
   if (options_.threads <= 1) {
-    find_visible(objects_, 0, eye.single, eye.floors.undersides, scratch.polar, scratch.visible, stats.polar);
+    find_visible(objects_, 0, eye.single, eye.floors.undersides, scratch.polar, scratch.visible,
+                 stats.polar);
     return;
   }
   // The tree's upper levels alone, then each subtree as a task: the same tests as in one thread.
@@ -225,15 +240,18 @@ void CullMap::find_polar(const Eye& eye, Scratch& scratch, Stats& stats) const {
   while (!roots.empty() && roots.size() < 8U * options_.threads) {
     std::vector<std::uint32_t> next;
     for (const std::uint32_t r : roots)
-      find_visible_children(objects_, r, eye.single, eye.floors.undersides, scratch.polar, scratch.visible, next, stats.polar);
+      find_visible_children(objects_, r, eye.single, eye.floors.undersides, scratch.polar,
+                            scratch.visible, next, stats.polar);
     roots = std::move(next);
   }
   std::vector<std::vector<std::uint32_t>> found(roots.size());
   std::vector<PolarStats> counts(roots.size());
-  tbb::task_arena arena(std::min(static_cast<int>(options_.threads), tbb::info::default_concurrency()));
+  tbb::task_arena arena(
+      std::min(static_cast<int>(options_.threads), tbb::info::default_concurrency()));
   arena.execute([&] {
     tbb::parallel_for(std::size_t{0}, roots.size(), [&](std::size_t i) {
-      find_visible(objects_, roots[i], eye.single, eye.floors.undersides, scratch.polar, found[i], counts[i]);
+      find_visible(objects_, roots[i], eye.single, eye.floors.undersides, scratch.polar, found[i],
+                   counts[i]);
     });
   });
   for (std::size_t i = 0; i < roots.size(); ++i) {
@@ -248,7 +266,8 @@ void CullMap::find_orthographic(const Eye& eye, Scratch& scratch) const {
   map.clear(heights);
   const auto hidden = [&](const BoxTree::Node& node, std::uint32_t c, bool finished) {
     const double top = static_cast<double>(node.hi_y[c]) - eye.apex.y;
-    return map.hides(heights, {static_cast<double>(node.lo_x[c]), static_cast<double>(node.lo_z[c])},
+    return map.hides(heights,
+                     {static_cast<double>(node.lo_x[c]), static_cast<double>(node.lo_z[c])},
                      {static_cast<double>(node.hi_x[c]), static_cast<double>(node.hi_z[c])},
                      static_cast<float>(top + 1e-6 * std::abs(top)), finished);
   };
@@ -264,17 +283,22 @@ void CullMap::find_orthographic(const Eye& eye, Scratch& scratch) const {
     for (const BoxTree::Node& node : walls_.tree.nodes)
       for (std::uint32_t c = 0; c < node.count; ++c) {
         if ((node.child[c] & BoxTree::kItem) == 0) continue;
-        const double dx = std::max({static_cast<double>(node.lo_x[c]) - eye.apex.x, eye.apex.x - static_cast<double>(node.hi_x[c]), 0.0});
-        const double dz = std::max({static_cast<double>(node.lo_z[c]) - eye.apex.z, eye.apex.z - static_cast<double>(node.hi_z[c]), 0.0});
+        const double dx = std::max({static_cast<double>(node.lo_x[c]) - eye.apex.x,
+                                    eye.apex.x - static_cast<double>(node.hi_x[c]), 0.0});
+        const double dz = std::max({static_cast<double>(node.lo_z[c]) - eye.apex.z,
+                                    eye.apex.z - static_cast<double>(node.hi_z[c]), 0.0});
         all.push_back({std::max(dx, dz), &node, c});
       }
     std::sort(all.begin(), all.end(), [](const Near& a, const Near& b) {
-      return a.distance != b.distance ? a.distance < b.distance : a.node->child[a.child] < b.node->child[b.child];
+      return a.distance != b.distance ? a.distance < b.distance
+                                      : a.node->child[a.child] < b.node->child[b.child];
     });
     for (const Near& n : all)
-      if (!hidden(*n.node, n.child, false)) draw_orthographic(n.node->child[n.child] & ~BoxTree::kItem, eye, scratch);
+      if (!hidden(*n.node, n.child, false))
+        draw_orthographic(n.node->child[n.child] & ~BoxTree::kItem, eye, scratch);
   } else {
-    for (const std::uint32_t s : order) draw_orthographic(s, eye, scratch);
+    for (const std::uint32_t s : order)
+      draw_orthographic(s, eye, scratch);
   }
   map.finish(heights);
   if (objects_.nodes.empty()) return;

@@ -13,12 +13,12 @@
 
 namespace ivis {
 
-/// The cull map: shrunk prisms and terrain throw shadows over a 2.5D scene; what lies in them is hidden.
-/// The orthographic map draws no terrain: it lists what only terrain hides.
-/// Guarantee: conservative: an object seen from anywhere in the cell is never left out.
-/// Errors:    kInvalidArgument if the cell's reach is larger than the occluders were shrunk for.
-/// Threads:   solve() is const and reentrant; the result does not depend on options.threads.
-/// Cost:      polar: O(visible hierarchy nodes + azimuth bins of the occluders met); bench/cull_map_bench.cpp.
+/// The cull map: shrunk prisms and terrain throw shadows over a 2.5D scene; what lies in them is
+/// hidden. The orthographic map draws no terrain: it lists what only terrain hides. Guarantee:
+/// conservative: an object seen from anywhere in the cell is never left out. Errors:
+/// kInvalidArgument if the cell's reach is larger than the occluders were shrunk for. Threads:
+/// solve() is const and reentrant; the result does not depend on options.threads. Cost:      polar:
+/// O(visible hierarchy nodes + azimuth bins of the occluders met); bench/cull_map_bench.cpp.
 /// Source:    Wonka, Wimmer, Sillion, Instant Visibility, 2001, section 5.1.
 /// Departs:   polar map by default; real undersides of prisms; several layers an azimuth.
 class CullMap : public Method {

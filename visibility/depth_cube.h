@@ -24,7 +24,7 @@ struct alignas(64) FaceBatch {
 // kDepthGuard * distance / c of itself. Planes seen more edge-on than kEdgeOn are not drawn.
 inline constexpr float kDepthGuard = 4e-6F;
 inline constexpr float kEdgeOn = 4e-5F;
-inline constexpr float kEdgeGuard = 6e-7F;  ///< of an edge's length times its corners' distance
+inline constexpr float kEdgeGuard = 6e-7F;   ///< of an edge's length times its corners' distance
 inline constexpr float kPixelGuard = 0.01F;  ///< what a box is widened by, pixels
 inline constexpr float kRelative = 2e-6F;    ///< what a box is brought nearer by
 

@@ -9,18 +9,24 @@ namespace ivis {
 
 const char* to_string(Guarantee g) {
   switch (g) {
-    case Guarantee::kConservative: return "conservative";
-    case Guarantee::kExactAtSamples: return "exact at samples";
-    case Guarantee::kAggressive: return "aggressive";
+    case Guarantee::kConservative:
+      return "conservative";
+    case Guarantee::kExactAtSamples:
+      return "exact at samples";
+    case Guarantee::kAggressive:
+      return "aggressive";
   }
   return "unknown";
 }
 
 const char* to_string(Backend b) {
   switch (b) {
-    case Backend::kAuto: return "auto";
-    case Backend::kCpu: return "cpu";
-    case Backend::kGl: return "gl";
+    case Backend::kAuto:
+      return "auto";
+    case Backend::kCpu:
+      return "cpu";
+    case Backend::kGl:
+      return "gl";
   }
   return "unknown";
 }
@@ -54,11 +60,13 @@ const std::vector<Entry>& entries() {
 
 std::vector<MethodTraits> method_list() {
   std::vector<MethodTraits> traits;
-  for (const Entry& e : entries()) traits.push_back(e.traits);
+  for (const Entry& e : entries())
+    traits.push_back(e.traits);
   return traits;
 }
 
-Result<std::unique_ptr<Method>> make_method(std::string_view name, const Scene& scene, const OccluderSet& occluders,
+Result<std::unique_ptr<Method>> make_method(std::string_view name, const Scene& scene,
+                                            const OccluderSet& occluders,
                                             const MethodOptions& options) {
   std::string known;
   for (const Entry& e : entries()) {

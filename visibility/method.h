@@ -21,10 +21,10 @@ enum class Guarantee {
 const char* to_string(Guarantee g);
 
 struct MethodTraits {
-  std::string name;        ///< as on the command line
+  std::string name;  ///< as on the command line
   Guarantee guarantee = Guarantee::kConservative;
   bool needs_occluders = true;
-  std::string summary;     ///< one line for --help
+  std::string summary;  ///< one line for --help
 };
 
 /// Which map the cull map is sampled on.
@@ -34,7 +34,7 @@ enum class CullMapKind { kPolar, kOrthographic };
 enum class Backend {
   kAuto,  ///< OpenGL where it is built in and drawn by hardware, else and on any failure the CPU
   kCpu,
-  kGl,    ///< OpenGL, by software if need be; an error where that fails
+  kGl,  ///< OpenGL, by software if need be; an error where that fails
 };
 
 const char* to_string(Backend b);  ///< "auto", "cpu", "gl"
@@ -50,10 +50,11 @@ struct MethodOptions {
   CullMapKind map = CullMapKind::kPolar;
   /// Threads inside one solve. The result has the same bits whatever the number.
   unsigned threads = 1;
-  /// Draw only so many occluders, those of largest projected area first; 0: all that are not hidden.
+  /// Draw only so many occluders, those of largest projected area first; 0: all that are not
+  /// hidden.
   std::size_t max_occluders = 0;
-  /// Occlusion map: pixels a side of each of its six faces, a multiple of 16 from 64 to 4096. 0: 512, or 1024 for
-  /// reaches below half a metre, which a pixel's margin would add much to.
+  /// Occlusion map: pixels a side of each of its six faces, a multiple of 16 from 64 to 4096. 0:
+  /// 512, or 1024 for reaches below half a metre, which a pixel's margin would add much to.
   std::uint32_t map_pixels = 0;
   Backend backend = Backend::kAuto;
   /// make_gl_occlusion_map of visibility/gl, from programs that link it; null: there is no OpenGL.
@@ -82,9 +83,9 @@ class Method {
 /// Traits of every registered method.
 std::vector<MethodTraits> method_list();
 
-/// Errors: kInvalidArgument naming `name` and the known ones, what check_numbers() finds, or that the
-/// method has no OpenGL backend; kMismatch if the occluders belong to another scene; kUnsupported if
-/// Backend::kGl is asked for and does not work. Cost: O(objects log objects).
+/// Errors: kInvalidArgument naming `name` and the known ones, what check_numbers() finds, or that
+/// the method has no OpenGL backend; kMismatch if the occluders belong to another scene;
+/// kUnsupported if Backend::kGl is asked for and does not work. Cost: O(objects log objects).
 Result<std::unique_ptr<Method>> make_method(std::string_view name, const Scene& scene,
                                             const OccluderSet& occluders,
                                             const MethodOptions& options = {});

@@ -32,7 +32,8 @@ struct OccluderPieces {
     std::uint32_t first_real_level =
         0;  ///< of a floored or grounded prism: as it stands, where its rule does not hold
     glm::vec3 lo{0}, hi{0};  ///< of all that may be drawn
-    std::uint32_t first_floor = 0;  ///< of a solid: half-spaces that the cell must lie in, or else it is drawn as it stands
+    std::uint32_t first_floor =
+        0;  ///< of a solid: half-spaces that the cell must lie in, or else it is drawn as it stands
     std::uint32_t floors = 0;
     // Of a sheet: it is { x : normal.x = offset } relative to the origin.
     Vec3 normal{0};

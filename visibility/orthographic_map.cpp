@@ -10,7 +10,9 @@ namespace {
 constexpr float kNothing = -std::numeric_limits<float>::infinity();
 constexpr double kRelative = 1e-6;
 
-double cross(const Vec2& a, const Vec2& b) { return a.x * b.y - a.y * b.x; }
+double cross(const Vec2& a, const Vec2& b) {
+  return a.x * b.y - a.y * b.x;
+}
 
 /// The x at row z within the half-plane cross(a, p) >= 0 (sign +1) or <= 0 (sign -1).
 void clip_row(const Vec2& a, double sign, double z, double& x0, double& x1) {
@@ -61,9 +63,12 @@ OrthographicMap::OrthographicMap(const Aabb& bounds, double square_m) {
   }
 }
 
-void OrthographicMap::clear(Heights& heights) const { heights.least.assign(total_, kNothing); }
+void OrthographicMap::clear(Heights& heights) const {
+  heights.least.assign(total_, kNothing);
+}
 
-void OrthographicMap::draw(const WallSet& walls, const WallSet::Solid& solid, const Vec3& eye, Heights& heights) const {
+void OrthographicMap::draw(const WallSet& walls, const WallSet::Solid& solid, const Vec3& eye,
+                           Heights& heights) const {
   if (levels_.empty()) return;
   Chain chain;
   chain.top = static_cast<double>(solid.top) - eye.y;
@@ -83,7 +88,8 @@ void OrthographicMap::draw(const WallSet& walls, const WallSet::Solid& solid, co
       return away ? turn > 0 : turn < 0;
     };
     std::uint32_t start = 0;
-    while (start < ring.count && wanted(start)) ++start;
+    while (start < ring.count && wanted(start))
+      ++start;
     if (start == ring.count) start = 0;  // a court about the eye: cut anywhere
     for (std::uint32_t i = 0; i < ring.count; ++i) {
       const std::uint32_t e = away ? start + i : start + ring.count - i;
@@ -102,15 +108,17 @@ void OrthographicMap::draw(const WallSet& walls, const WallSet::Solid& solid, co
         chain.begin(a);
       }
       chain.corners.push_back(b);
-      chain.plane.push_back(Vec2{b.y - a.y, a.x - b.x} / c);  // (b-a) turned; dot with a is cross(a,b)/c = 1
+      chain.plane.push_back(Vec2{b.y - a.y, a.x - b.x} /
+                            c);  // (b-a) turned; dot with a is cross(a,b)/c = 1
     }
     draw_chain(chain, heights);
   }
 }
 
-// Over the part of a square that wall j's azimuths take, the shadow's height top * dot(plane_j, p) is linear, so it is
-// nowhere below the least value at the square's corners; over the whole square it is nowhere below the least over the
-// walls its corners' azimuths span. The square is in shadow if it lies behind the lines of all those walls.
+// Over the part of a square that wall j's azimuths take, the shadow's height top * dot(plane_j, p)
+// is linear, so it is nowhere below the least value at the square's corners; over the whole square
+// it is nowhere below the least over the walls its corners' azimuths span. The square is in shadow
+// if it lies behind the lines of all those walls.
 void OrthographicMap::draw_chain(const Chain& chain, Heights& heights) const {
   if (chain.plane.empty()) return;
   const Level& grid = levels_[0];
@@ -143,10 +151,13 @@ void OrthographicMap::draw_chain(const Chain& chain, Heights& heights) const {
     std::int32_t wall = 0;
     for (std::int32_t c = c0; c <= c1; ++c) {
       const Vec2 p{x_lo + c * square_m_, z};
-      while (wall > 0 && cross(chain.corners[static_cast<std::size_t>(wall)], p) < 0) --wall;
-      while (wall + 1 < walls && cross(chain.corners[static_cast<std::size_t>(wall) + 1], p) > 0) ++wall;
+      while (wall > 0 && cross(chain.corners[static_cast<std::size_t>(wall)], p) < 0)
+        --wall;
+      while (wall + 1 < walls && cross(chain.corners[static_cast<std::size_t>(wall) + 1], p) > 0)
+        ++wall;
       const bool in_wedge = cross(first, p) > 0 && cross(last, p) < 0;
-      row[static_cast<std::size_t>(c)] = {in_wedge && glm::dot(chain.plane[static_cast<std::size_t>(wall)], p) > 1 ? wall : -1, p};
+      row[static_cast<std::size_t>(c)] = {
+          in_wedge && glm::dot(chain.plane[static_cast<std::size_t>(wall)], p) > 1 ? wall : -1, p};
     }
     if (above_any) {
       for (std::int32_t c = std::max(c0, above_c0); c < std::min(c1, above_c1); ++c) {
@@ -170,7 +181,9 @@ void OrthographicMap::draw_chain(const Chain& chain, Heights& heights) const {
           }
         if (!in) continue;
         const auto value = static_cast<float>(least - kRelative * std::abs(least));
-        float& height = heights.least[static_cast<std::size_t>(r - 1) * static_cast<std::size_t>(grid.columns) + i];
+        float& height =
+            heights.least[static_cast<std::size_t>(r - 1) * static_cast<std::size_t>(grid.columns) +
+                          i];
         height = std::max(height, value);
       }
     }
@@ -192,16 +205,21 @@ void OrthographicMap::finish(Heights& heights) const {
         float least = std::numeric_limits<float>::infinity();
         for (std::int32_t y = 2 * r; y < std::min(2 * r + 2, fine.rows); ++y)
           for (std::int32_t x = 2 * c; x < std::min(2 * c + 2, fine.columns); ++x)
-            least = std::min(least, from[static_cast<std::size_t>(y) * static_cast<std::size_t>(fine.columns) + static_cast<std::size_t>(x)]);
-        to[static_cast<std::size_t>(r) * static_cast<std::size_t>(coarse.columns) + static_cast<std::size_t>(c)] = least;
+            least = std::min(
+                least, from[static_cast<std::size_t>(y) * static_cast<std::size_t>(fine.columns) +
+                            static_cast<std::size_t>(x)]);
+        to[static_cast<std::size_t>(r) * static_cast<std::size_t>(coarse.columns) +
+           static_cast<std::size_t>(c)] = least;
       }
   }
 }
 
-bool OrthographicMap::hides(const Heights& heights, const Vec2& lo, const Vec2& hi, float top, bool finished) const {
+bool OrthographicMap::hides(const Heights& heights, const Vec2& lo, const Vec2& hi, float top,
+                            bool finished) const {
   if (levels_.empty()) return false;
   const Level& grid = levels_[0];
-  // A square more on each side would cost little; the outward rounding of boxes covers what division rounds.
+  // A square more on each side would cost little; the outward rounding of boxes covers what
+  // division rounds.
   const auto c0 = static_cast<std::int32_t>(std::floor((lo.x - lo_.x) / square_m_ - 1e-6));
   const auto c1 = static_cast<std::int32_t>(std::floor((hi.x - lo_.x) / square_m_ + 1e-6));
   const auto r0 = static_cast<std::int32_t>(std::floor((lo.y - lo_.y) / square_m_ - 1e-6));
@@ -209,21 +227,25 @@ bool OrthographicMap::hides(const Heights& heights, const Vec2& lo, const Vec2& 
   if (c0 < 0 || r0 < 0 || c1 >= grid.columns || r1 >= grid.rows) return false;
   std::size_t level = 0;
   if (finished)
-    while (level + 1 < levels_.size() && (std::max(c1 - c0, r1 - r0) >> level) > 1) ++level;
+    while (level + 1 < levels_.size() && (std::max(c1 - c0, r1 - r0) >> level) > 1)
+      ++level;
   return hides_in(heights, level, c0, c1, r0, r1, top);
 }
 
-bool OrthographicMap::hides_in(const Heights& heights, std::size_t level, std::int32_t c0, std::int32_t c1, std::int32_t r0,
-                               std::int32_t r1, float top) const {
+bool OrthographicMap::hides_in(const Heights& heights, std::size_t level, std::int32_t c0,
+                               std::int32_t c1, std::int32_t r0, std::int32_t r1, float top) const {
   const Level& grid = levels_[level];
   for (std::int32_t r = r0 >> level; r <= r1 >> level; ++r)
     for (std::int32_t c = c0 >> level; c <= c1 >> level; ++c) {
-      const float least = heights.least[grid.first + static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.columns) + static_cast<std::size_t>(c)];
+      const float least =
+          heights.least[grid.first +
+                        static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.columns) +
+                        static_cast<std::size_t>(c)];
       if (top <= least) continue;
       if (level == 0) return false;
       const std::int32_t side = 1 << level;
-      if (!hides_in(heights, level - 1, std::max(c0, c * side), std::min(c1, c * side + side - 1), std::max(r0, r * side),
-                    std::min(r1, r * side + side - 1), top))
+      if (!hides_in(heights, level - 1, std::max(c0, c * side), std::min(c1, c * side + side - 1),
+                    std::max(r0, r * side), std::min(r1, r * side + side - 1), top))
         return false;
     }
   return true;

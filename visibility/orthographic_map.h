@@ -8,14 +8,16 @@
 
 namespace ivis {
 
-/// The cull map sampled orthographically from above, as in the paper: a grid over the ground plane that holds,
-/// for each square, a height below which everything over the whole square is hidden.
-/// Guarantee: conservative: only squares that lie wholly in a shadow are written, with the shadow's least
+/// The cull map sampled orthographically from above, as in the paper: a grid over the ground plane
+/// that holds, for each square, a height below which everything over the whole square is hidden.
+/// Guarantee: conservative: only squares that lie wholly in a shadow are written, with the shadow's
+/// least
 ///            height over the square.
 /// Threads:   the geometry is read-only; each solve has a Heights of its own.
-/// Cost:      O(squares in the shadows of the solids drawn). Slower than the polar map; kept to compare.
-/// Source:    Wonka, Wimmer, Sillion 2001, section 5.1; Wonka and Schmalstieg 1999.
-/// Departs:   analytic heights on the CPU instead of a depth buffer; solids with a real underside throw no
+/// Cost:      O(squares in the shadows of the solids drawn). Slower than the polar map; kept to
+/// compare. Source:    Wonka, Wimmer, Sillion 2001, section 5.1; Wonka and Schmalstieg 1999.
+/// Departs:   analytic heights on the CPU instead of a depth buffer; solids with a real underside
+/// throw no
 ///            shadow here, as one height a square cannot tell what passes below.
 class OrthographicMap {
  public:
@@ -28,18 +30,20 @@ class OrthographicMap {
 
   void clear(Heights& heights) const;
   /// `eye` (the apex) is relative to the same origin.
-  void draw(const WallSet& walls, const WallSet::Solid& solid, const Vec3& eye, Heights& heights) const;
+  void draw(const WallSet& walls, const WallSet::Solid& solid, const Vec3& eye,
+            Heights& heights) const;
   /// After the last solid: fills the coarser levels.
   void finish(Heights& heights) const;
-  /// Is a box that spans lo..hi in plan (relative to the origin) and tops at `top` (relative to the eye)
-  /// hidden? `finished`: the coarser levels are up to date.
-  bool hides(const Heights& heights, const Vec2& lo, const Vec2& hi, float top, bool finished) const;
+  /// Is a box that spans lo..hi in plan (relative to the origin) and tops at `top` (relative to the
+  /// eye) hidden? `finished`: the coarser levels are up to date.
+  bool hides(const Heights& heights, const Vec2& lo, const Vec2& hi, float top,
+             bool finished) const;
 
  private:
   struct Chain;
   void draw_chain(const Chain& chain, Heights& heights) const;
-  bool hides_in(const Heights& heights, std::size_t level, std::int32_t c0, std::int32_t c1, std::int32_t r0, std::int32_t r1,
-                float top) const;
+  bool hides_in(const Heights& heights, std::size_t level, std::int32_t c0, std::int32_t c1,
+                std::int32_t r0, std::int32_t r1, float top) const;
 
   struct Level {
     std::size_t first;

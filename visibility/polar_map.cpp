@@ -24,11 +24,14 @@ constexpr std::uint32_t kW = BoxTree::kWidth;
 constexpr std::uint32_t kLayers = PolarMap::kLayers;
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-// Rounding. Positions relative to the eye carry a relative error of 2^-23 or so (absolute errors are paid
-// for by the occluders' slack); an azimuth t is wrong by less than 1e-6, which is 0.001 of a bin at 8192 bins a
-// circle and 0.004 at 32768. kBinSlack covers that; kRelative covers the few operations on slopes and 1/w.
+// Rounding. Positions relative to the eye carry a relative error of 2^-23 or so (absolute errors
+// are paid for by the occluders' slack); an azimuth t is wrong by less than 1e-6, which is 0.001 of
+// a bin at 8192 bins a circle and 0.004 at 32768. kBinSlack covers that; kRelative covers the few
+// operations on slopes and 1/w.
 constexpr float kRelative = 1e-6F;
-constexpr float bin_slack(std::uint32_t bins) { return 1.0e-6F * static_cast<float>(bins) / 8.0F + 0.001F; }
+constexpr float bin_slack(std::uint32_t bins) {
+  return 1.0e-6F * static_cast<float>(bins) / 8.0F + 0.001F;
+}
 
 using D = hn::CappedTag<float, kW>;
 using DI = hn::RebindToSigned<D>;
@@ -70,9 +73,9 @@ void choose(bool undersides, const PolarMap& map, const F& f) {
 
 /// What the boxes of one node look like from the eye.
 struct Seen {
-  alignas(64) float high[kW];  ///< largest slope
-  alignas(64) float low[kW];   ///< least slope
-  alignas(64) float near[kW];  ///< largest 1/w
+  alignas(64) float high[kW];          ///< largest slope
+  alignas(64) float low[kW];           ///< least slope
+  alignas(64) float near[kW];          ///< largest 1/w
   alignas(64) std::int32_t first[kW];  ///< first bin, in [0, bins)
   alignas(64) std::int32_t last[kW];   ///< last bin, >= first, may pass `bins`
   alignas(64) std::int32_t row[kW];    ///< of the horizon: none farther than the box
@@ -86,7 +89,8 @@ struct View {
   const Horizon* horizon = nullptr;
 };
 
-/// Projects the boxes of a node. Returns the mask of children whose plan holds the eye (always visible).
+/// Projects the boxes of a node. Returns the mask of children whose plan holds the eye (always
+/// visible).
 template <bool kUndersides, bool kTerrain>
 HWY_INLINE std::uint32_t project(const BoxTree::Node& node, const View& view, Seen& seen) {
   const D d;
@@ -113,10 +117,13 @@ HWY_INLINE std::uint32_t project(const BoxTree::Node& node, const View& view, Se
     const V guard = hn::Set(d, 1.0F + kRelative);
     hn::Store(hn::Mul(hn::Div(one, safe_near), guard), d, seen.near + l);
     if constexpr (kTerrain) {
-      // Rows are floats of few mantissa bits: the row of a distance is what is left of its own bits.
+      // Rows are floats of few mantissa bits: the row of a distance is what is left of its own
+      // bits.
       const auto bits = hn::BitCast(di, hn::Mul(safe_near, hn::Set(d, 1.0F - kRelative)));
-      const auto row = hn::Sub(hn::ShiftRight<Horizon::kShift>(bits), hn::Set(di, view.horizon->first_row()));
-      hn::Store(hn::Min(hn::Max(row, hn::Zero(di)), hn::Set(di, view.horizon->last_row())), di, seen.row + l);
+      const auto row =
+          hn::Sub(hn::ShiftRight<Horizon::kShift>(bits), hn::Set(di, view.horizon->first_row()));
+      hn::Store(hn::Min(hn::Max(row, hn::Zero(di)), hn::Set(di, view.horizon->last_row())), di,
+                seen.row + l);
     }
     const V high = hn::Div(y1, hn::IfThenElse(hn::Gt(y1, zero), safe_near, far));
     hn::Store(hn::Add(high, hn::Mul(hn::Abs(high), hn::Set(d, kRelative))), d, seen.high + l);
@@ -153,13 +160,16 @@ HWY_INLINE std::uint32_t project(const BoxTree::Node& node, const View& view, Se
 HWY_INLINE std::uint32_t holds_eye(const BoxTree::Node& node, const View& view) {
   std::uint32_t mask = 0;
   for (std::uint32_t c = 0; c < node.count; ++c)
-    if (node.lo_x[c] <= view.x && node.hi_x[c] >= view.x && node.lo_z[c] <= view.z && node.hi_z[c] >= view.z) mask |= 1U << c;
+    if (node.lo_x[c] <= view.x && node.hi_x[c] >= view.x && node.lo_z[c] <= view.z &&
+        node.hi_z[c] >= view.z)
+      mask |= 1U << c;
   return mask;
 }
 
 /// Does one bin hide every box of the node? Bit i: bin `at[i]` hides box i.
 template <bool kUndersides, bool kTerrain>
-HWY_INLINE std::uint32_t hidden_in_bin(const PolarMap& map, const Seen& seen, const std::int32_t* at) {
+HWY_INLINE std::uint32_t hidden_in_bin(const PolarMap& map, const Seen& seen,
+                                       const std::int32_t* at) {
   const D d;
   const DI di;
   std::uint32_t bits = 0;
@@ -174,7 +184,8 @@ HWY_INLINE std::uint32_t hidden_in_bin(const PolarMap& map, const Seen& seen, co
       const Horizon& horizon = *map.horizon();
       const auto stride = hn::Set(di, static_cast<std::int32_t>(horizon.stride()));
       const auto unit = hn::ShiftRightSame(index, horizon.unit_shift());
-      const V slope = hn::GatherIndex(d, horizon.slopes(), hn::Add(hn::Mul(hn::Load(di, seen.row + l), stride), unit));
+      const V slope = hn::GatherIndex(d, horizon.slopes(),
+                                      hn::Add(hn::Mul(hn::Load(di, seen.row + l), stride), unit));
       hidden = hn::Le(high, slope);
       // Slopes up to the horizon are hidden by it: a wall need reach down to there only.
       if constexpr (kUndersides) low = hn::Max(low, slope);
@@ -196,9 +207,11 @@ struct Box {
   int shift;             ///< of its units
 };
 
-/// Bit i: element `at + i` of the planes (S, W, B a layer, `stride` apart) hides the box; for i in [0, 16).
+/// Bit i: element `at + i` of the planes (S, W, B a layer, `stride` apart) hides the box; for i in
+/// [0, 16).
 template <bool kUndersides, bool kTerrain>
-HWY_INLINE std::uint32_t hidden_in_16(const float* planes, std::size_t stride, std::size_t at, const Box& box) {
+HWY_INLINE std::uint32_t hidden_in_16(const float* planes, std::size_t stride, std::size_t at,
+                                      const Box& box) {
   const D d;
   std::uint32_t bits = 0;
   const V high = hn::Set(d, box.high);
@@ -225,9 +238,11 @@ HWY_INLINE std::uint32_t hidden_in_16(const float* planes, std::size_t stride, s
   return bits;
 }
 
-/// Do all bins first..last, none of which wraps, hide the box? `coarse`: the coarse minima are up to date.
+/// Do all bins first..last, none of which wraps, hide the box? `coarse`: the coarse minima are up
+/// to date.
 template <bool kUndersides, bool kTerrain>
-HWY_INLINE bool hidden_in_run(const PolarMap& map, const Box& box, std::int32_t first, std::int32_t last, bool coarse) {
+HWY_INLINE bool hidden_in_run(const PolarMap& map, const Box& box, std::int32_t first,
+                              std::int32_t last, bool coarse) {
   const float* planes = map.slope(0);
   const std::size_t stride = map.stride();
   std::int32_t at = first;
@@ -236,30 +251,39 @@ HWY_INLINE bool hidden_in_run(const PolarMap& map, const Box& box, std::int32_t 
       // Sixteen blocks at once by their minima; a block that fails is looked at bin by bin.
       const std::int32_t blocks = std::min(16, (last + 1 - at) / 16);
       const std::uint32_t want = blocks == 16 ? 0xffffU : ((1U << blocks) - 1U);
-      std::uint32_t fails = want & ~hidden_in_16<kUndersides, kTerrain>(map.coarse(), map.coarse_stride(), static_cast<std::size_t>(at / 16), box);
+      std::uint32_t fails =
+          want & ~hidden_in_16<kUndersides, kTerrain>(map.coarse(), map.coarse_stride(),
+                                                      static_cast<std::size_t>(at / 16), box);
       for (; fails != 0; fails &= fails - 1) {
         const std::int32_t bin = at + 16 * std::countr_zero(fails);
-        if (hidden_in_16<kUndersides, kTerrain>(planes, stride, static_cast<std::size_t>(bin), box) != 0xffffU)
+        if (hidden_in_16<kUndersides, kTerrain>(planes, stride, static_cast<std::size_t>(bin),
+                                                box) != 0xffffU)
           return false;
       }
       at += 16 * blocks;
       continue;
     }
-    if (hidden_in_16<kUndersides, kTerrain>(planes, stride, static_cast<std::size_t>(at), box) != 0xffffU) return false;
+    if (hidden_in_16<kUndersides, kTerrain>(planes, stride, static_cast<std::size_t>(at), box) !=
+        0xffffU)
+      return false;
     at += coarse && !kTerrain ? 16 - at % 16 : 16;
   }
   if (at > last) return true;
   const std::uint32_t want = (1U << (last - at + 1)) - 1U;
-  return (hidden_in_16<kUndersides, kTerrain>(planes, stride, static_cast<std::size_t>(at), box) & want) == want;
+  return (hidden_in_16<kUndersides, kTerrain>(planes, stride, static_cast<std::size_t>(at), box) &
+          want) == want;
 }
 
 /// Do all bins first..last hide the box? Up to 16 bins never wrap, thanks to the pad.
 template <bool kUndersides, bool kTerrain>
-HWY_INLINE bool hidden_in_all(const PolarMap& map, const Box& box, std::int32_t first, std::int32_t last, bool coarse) {
+HWY_INLINE bool hidden_in_all(const PolarMap& map, const Box& box, std::int32_t first,
+                              std::int32_t last, bool coarse) {
   const auto bins = static_cast<std::int32_t>(map.bins());
   if (last - first < 16) {
     const std::uint32_t want = (2U << (last - first)) - 1U;
-    return (hidden_in_16<kUndersides, kTerrain>(map.slope(0), map.stride(), static_cast<std::size_t>(first), box) & want) == want;
+    return (hidden_in_16<kUndersides, kTerrain>(map.slope(0), map.stride(),
+                                                static_cast<std::size_t>(first), box) &
+            want) == want;
   }
   if (last < bins) return hidden_in_run<kUndersides, kTerrain>(map, box, first, last, coarse);
   return hidden_in_run<kUndersides, kTerrain>(map, box, first, bins - 1, coarse) &&
@@ -278,8 +302,8 @@ HWY_INLINE Box box_of(const View& view, const Seen& seen, std::uint32_t c) {
 
 /// Mask of the node's children that the map does not hide.
 template <bool kUndersides, bool kTerrain>
-HWY_INLINE std::uint32_t visible_children(const BoxTree::Node& node, const View& view, const PolarMap& map, bool coarse,
-                                          Seen& seen) {
+HWY_INLINE std::uint32_t visible_children(const BoxTree::Node& node, const View& view,
+                                          const PolarMap& map, bool coarse, Seen& seen) {
   const std::uint32_t used = node.count == kW ? 0xffffU : ((1U << node.count) - 1U);
   const std::uint32_t around = project<kUndersides, kTerrain>(node, view, seen);
   // One bin in the middle settles most visible boxes.
@@ -287,13 +311,16 @@ HWY_INLINE std::uint32_t visible_children(const BoxTree::Node& node, const View&
   const DI di;
   const auto wrap = hn::Set(di, view.bins - 1);
   for (std::uint32_t l = 0; l < kW; l += static_cast<std::uint32_t>(hn::Lanes(di)))
-    hn::Store(hn::And(hn::ShiftRight<1>(hn::Add(hn::Load(di, seen.first + l), hn::Load(di, seen.last + l))), wrap), di,
-              middle + l);
+    hn::Store(hn::And(hn::ShiftRight<1>(
+                          hn::Add(hn::Load(di, seen.first + l), hn::Load(di, seen.last + l))),
+                      wrap),
+              di, middle + l);
   std::uint32_t open = used & hidden_in_bin<kUndersides, kTerrain>(map, seen, middle) & ~around;
   std::uint32_t visible = used & ~open;
   for (; open != 0; open &= open - 1) {
     const auto c = static_cast<std::uint32_t>(std::countr_zero(open));
-    if (!hidden_in_all<kUndersides, kTerrain>(map, box_of<kUndersides, kTerrain>(view, seen, c), seen.first[c], seen.last[c], coarse))
+    if (!hidden_in_all<kUndersides, kTerrain>(map, box_of<kUndersides, kTerrain>(view, seen, c),
+                                              seen.first[c], seen.last[c], coarse))
       visible |= 1U << c;
   }
   return visible;
@@ -356,7 +383,8 @@ struct Corners {
     const D d;
     const std::size_t padded = count + kW;
     if (x.size() < padded)
-      for (auto* v : {&x, &z, &t, &k}) v->resize(padded);
+      for (auto* v : {&x, &z, &t, &k})
+        v->resize(padded);
     for (std::uint32_t i = 0; i < count; i += static_cast<std::uint32_t>(hn::Lanes(d))) {
       const V px = hn::Sub(hn::LoadU(d, walls.x.data() + first + i), hn::Set(d, view.x));
       const V pz = hn::Sub(hn::LoadU(d, walls.z.data() + first + i), hn::Set(d, view.z));
@@ -371,10 +399,10 @@ struct Corners {
 
 /// Draws the walls of one solid after another.
 ///
-/// A chain is a run of walls joined at corners whose azimuth rises: a function k(t) = 1/w, linear in t between
-/// corners and face borders. A bin [i, i+1] is written when the chain covers it whole, with the least and largest
-/// k over [i - slack, i+1 + slack]: so neither an azimuth wrong by `slack` nor a corner next to a bin's
-/// border can make a statement too strong.
+/// A chain is a run of walls joined at corners whose azimuth rises: a function k(t) = 1/w, linear
+/// in t between corners and face borders. A bin [i, i+1] is written when the chain covers it whole,
+/// with the least and largest k over [i - slack, i+1 + slack]: so neither an azimuth wrong by
+/// `slack` nor a corner next to a bin's border can make a statement too strong.
 template <bool kUndersides, bool kTerrain>
 class WallPainter {
  public:
@@ -392,8 +420,9 @@ class WallPainter {
     for (std::uint32_t r = 0; r < solid.rings; ++r) {
       const WallSet::Ring& ring = walls.rings[solid.first_ring + r];
       const std::uint32_t offset = ring.first - first.first;
-      // A top above the eye is blocked up to the slope of the near wall; one below it, up to that of the far
-      // wall, whose slope is larger. With a real bottom the near wall adds the slopes below.
+      // A top above the eye is blocked up to the slope of the near wall; one below it, up to that
+      // of the far wall, whose slope is larger. With a real bottom the near wall adds the slopes
+      // below.
       const bool below = height.top < 0;
       if (!below || kUndersides) chains(offset, ring.count, height, false);
       if (below) chains(offset, ring.count, height, true);
@@ -410,10 +439,14 @@ class WallPainter {
       const float turn = x[e] * z[f] - z[e] * x[f];
       return away ? turn > 0 : turn < 0;
     };
-    // Walked so that azimuth rises: along the ring for `away`, against it otherwise. Edge e joins e and e+1.
-    const auto next = [&](std::uint32_t e) { return away ? (e + 1 == n ? 0 : e + 1) : (e == 0 ? n - 1 : e - 1); };
+    // Walked so that azimuth rises: along the ring for `away`, against it otherwise. Edge e joins e
+    // and e+1.
+    const auto next = [&](std::uint32_t e) {
+      return away ? (e + 1 == n ? 0 : e + 1) : (e == 0 ? n - 1 : e - 1);
+    };
     std::uint32_t e = 0;
-    while (e < n && wanted(e)) ++e;
+    while (e < n && wanted(e))
+      ++e;
     if (e == n) e = 0;  // all of them, as of a court about the eye: one turn, cut anywhere
     for (std::uint32_t done = 0; done < n; ++done, e = next(e)) {
       if (!wanted(e)) {
@@ -447,7 +480,8 @@ class WallPainter {
     // Linear only within a face: add the points where the wall crosses the diagonals.
     for (float cut = (std::floor(ta / face_) + 1) * face_; cut < tb; cut += face_) {
       chain_t_.push_back(cut);
-      chain_k_.push_back(inverse_on_diagonal(a, b, static_cast<std::uint32_t>(std::lround(cut / face_)) & 3U));
+      chain_k_.push_back(
+          inverse_on_diagonal(a, b, static_cast<std::uint32_t>(std::lround(cut / face_)) & 3U));
     }
     chain_t_.push_back(tb);
     chain_k_.push_back(corners_.k[b]);
@@ -474,13 +508,17 @@ class WallPainter {
     chain_k_.clear();
   }
 
-  /// Is the whole chain behind what was drawn before? So are, mostly, the far walls of a court behind its front.
+  /// Is the whole chain behind what was drawn before? So are, mostly, the far walls of a court
+  /// behind its front.
   bool chain_hidden(const Height& height) const {
     float largest = 0;
-    for (const float k : chain_k_) largest = std::max(largest, k);
+    for (const float k : chain_k_)
+      largest = std::max(largest, k);
     float least = kInf;
-    for (const float k : chain_k_) least = std::min(least, k);
-    Box box{height.top * (height.top > 0 ? largest : least), height.bottom * (height.bottom > 0 ? least : largest), largest, nullptr, 0};
+    for (const float k : chain_k_)
+      least = std::min(least, k);
+    Box box{height.top * (height.top > 0 ? largest : least),
+            height.bottom * (height.bottom > 0 ? least : largest), largest, nullptr, 0};
     if constexpr (kTerrain) {
       box.horizon = view_.horizon->row(view_.horizon->row_at((1.0F - kRelative) / largest));
       box.shift = view_.horizon->unit_shift();
@@ -510,8 +548,9 @@ class WallPainter {
       const float tb = chain_t_[p + 1];
       const float ka = chain_k_[p];
       const float kb = chain_k_[p + 1];
-      pieces_.push_back({ta, tb, ka, tb > ta ? (kb - ka) / (tb - ta) : 0.0F, std::min(ka, kb), std::max(ka, kb),
-                         static_cast<std::int32_t>(std::floor(ta - slack)), static_cast<std::int32_t>(std::floor(tb + slack))});
+      pieces_.push_back({ta, tb, ka, tb > ta ? (kb - ka) / (tb - ta) : 0.0F, std::min(ka, kb),
+                         std::max(ka, kb), static_cast<std::int32_t>(std::floor(ta - slack)),
+                         static_cast<std::int32_t>(std::floor(tb + slack))});
     }
     write(first, last, height);
   }
@@ -544,7 +583,8 @@ class WallPainter {
     const V k1 = hn::Add(ka, hn::Mul(hn::Sub(t1, ta), rate));
     const V low = hn::Max(hn::Sub(hn::Min(k0, k1), doubt), hn::Set(d, piece.low_k));
     const V high = hn::Min(hn::Add(hn::Max(k0, k1), doubt), hn::Set(d, piece.high_k));
-    const auto in = hn::RebindMask(d, hn::And(hn::Gt(bin, hn::Set(di, piece.first - 1)), hn::Lt(bin, hn::Set(di, piece.last + 1))));
+    const auto in = hn::RebindMask(d, hn::And(hn::Gt(bin, hn::Set(di, piece.first - 1)),
+                                              hn::Lt(bin, hn::Set(di, piece.last + 1))));
     least = hn::IfThenElse(in, hn::Min(least, low), least);
     largest = hn::IfThenElse(in, hn::Max(largest, high), largest);
   }
@@ -563,14 +603,17 @@ class WallPainter {
     for (std::int32_t at = first & ~(lanes - 1); at <= last; at += lanes) {
       V least = hn::Set(d, kInf);
       V largest = hn::Zero(d);
-      while (p0 < pieces_.size() && pieces_[p0].last < at) ++p0;
-      for (std::size_t p = p0; p < pieces_.size() && pieces_[p].first < at + lanes; ++p) range_over(pieces_[p], at, least, largest);
+      while (p0 < pieces_.size() && pieces_[p0].last < at)
+        ++p0;
+      for (std::size_t p = p0; p < pieces_.size() && pieces_[p].first < at + lanes; ++p)
+        range_over(pieces_[p], at, least, largest);
       V s = hn::Mul(top, top_by_least ? least : largest);
       s = hn::Sub(s, hn::Mul(hn::Abs(s), guard));
       V w = hn::Sub(least, hn::Mul(least, guard));
       if (!guards_.test_distance) w = hn::Set(d, kInf);
       const auto bin = hn::Add(hn::Iota(di, 0), hn::Set(di, at));
-      auto mine = hn::RebindMask(d, hn::And(hn::Gt(bin, hn::Set(di, first - 1)), hn::Lt(bin, hn::Set(di, last + 1))));
+      auto mine = hn::RebindMask(
+          d, hn::And(hn::Gt(bin, hn::Set(di, first - 1)), hn::Lt(bin, hn::Set(di, last + 1))));
       V b = hn::Set(d, -kInf);
       if constexpr (kUndersides) {
         if (height.bottom > -kInf && guards_.respect_undersides) {
@@ -597,13 +640,19 @@ class WallPainter {
 };
 
 View make_view(const float eye[3], const PolarMap& map) {
-  return {eye[0], eye[1], eye[2], static_cast<float>(map.bins()) / 8.0F, bin_slack(map.bins()),
-          static_cast<std::int32_t>(map.bins()), map.horizon()};
+  return {eye[0],
+          eye[1],
+          eye[2],
+          static_cast<float>(map.bins()) / 8.0F,
+          bin_slack(map.bins()),
+          static_cast<std::int32_t>(map.bins()),
+          map.horizon()};
 }
 
 template <bool kUndersides, bool kTerrain>
-void draw(const WallSet& walls, const float eye[3], const Floors& floors, std::span<const std::uint32_t> only, const PolarGuards& guards,
-          PolarMap& map, PolarStats& stats) {
+void draw(const WallSet& walls, const float eye[3], const Floors& floors,
+          std::span<const std::uint32_t> only, const PolarGuards& guards, PolarMap& map,
+          PolarStats& stats) {
   const View view = make_view(eye, map);
   WallPainter<kUndersides, kTerrain> painter(map, view, guards, stats);
   const auto paint = [&](std::uint32_t s) {
@@ -613,7 +662,8 @@ void draw(const WallSet& walls, const float eye[3], const Floors& floors, std::s
     ++stats.solids_drawn;
   };
   if (!only.empty()) {
-    for (const std::uint32_t s : only) paint(s);
+    for (const std::uint32_t s : only)
+      paint(s);
     return;
   }
   if (walls.tree.nodes.empty()) return;
@@ -630,7 +680,9 @@ void draw(const WallSet& walls, const float eye[3], const Floors& floors, std::s
     const Pending p = stack.back();
     stack.pop_back();
     // What was drawn since it was pushed may hide it now.
-    if (p.last >= p.first && hidden_in_all<kUndersides, kTerrain>(map, p.box, p.first, p.last, false)) continue;
+    if (p.last >= p.first &&
+        hidden_in_all<kUndersides, kTerrain>(map, p.box, p.first, p.last, false))
+      continue;
     if ((p.child & BoxTree::kItem) != 0) {
       paint(p.child & ~BoxTree::kItem);
       continue;
@@ -644,21 +696,24 @@ void draw(const WallSet& walls, const float eye[3], const Floors& floors, std::s
     for (; visible != 0; visible &= visible - 1) {
       const auto c = static_cast<std::uint32_t>(std::countr_zero(visible));
       const bool open = ((around >> c) & 1U) != 0;
-      stack.push_back({open ? kInf : seen.near[c], node.child[c], box_of<kUndersides, kTerrain>(view, seen, c),
-                       open ? 0 : seen.first[c], open ? -1 : seen.last[c]});
+      stack.push_back({open ? kInf : seen.near[c], node.child[c],
+                       box_of<kUndersides, kTerrain>(view, seen, c), open ? 0 : seen.first[c],
+                       open ? -1 : seen.last[c]});
     }
-    std::sort(stack.begin() + static_cast<std::ptrdiff_t>(begin), stack.end(), [](const Pending& a, const Pending& b) {
-      return a.near != b.near ? a.near < b.near : a.child < b.child;
-    });
+    std::sort(stack.begin() + static_cast<std::ptrdiff_t>(begin), stack.end(),
+              [](const Pending& a, const Pending& b) {
+                return a.near != b.near ? a.near < b.near : a.child < b.child;
+              });
   }
 }
 
 /// Tests the children of one node; hands visible items and nodes on.
 template <bool kUndersides, bool kTerrain, class OnItem, class OnNode>
-HWY_INLINE void step(const BoxTree::Node& node, const View& view, const PolarMap& map, Seen& seen, PolarStats& stats,
-                     const OnItem& on_item, const OnNode& on_node) {
+HWY_INLINE void step(const BoxTree::Node& node, const View& view, const PolarMap& map, Seen& seen,
+                     PolarStats& stats, const OnItem& on_item, const OnNode& on_node) {
   ++stats.nodes_tested;
-  for (std::uint32_t m = visible_children<kUndersides, kTerrain>(node, view, map, true, seen); m != 0; m &= m - 1) {
+  for (std::uint32_t m = visible_children<kUndersides, kTerrain>(node, view, map, true, seen);
+       m != 0; m &= m - 1) {
     const std::uint32_t child = node.child[static_cast<std::uint32_t>(std::countr_zero(m))];
     if ((child & BoxTree::kItem) != 0) {
       on_item(child & ~BoxTree::kItem);
@@ -670,15 +725,17 @@ HWY_INLINE void step(const BoxTree::Node& node, const View& view, const PolarMap
 
 template <bool kUndersides, bool kTerrain>
 void find_children(const BoxTree& tree, std::uint32_t root, const float eye[3], const PolarMap& map,
-                   std::vector<std::uint32_t>& visible, std::vector<std::uint32_t>& nodes, PolarStats& stats) {
+                   std::vector<std::uint32_t>& visible, std::vector<std::uint32_t>& nodes,
+                   PolarStats& stats) {
   Seen seen;
-  step<kUndersides, kTerrain>(tree.nodes[root], make_view(eye, map), map, seen, stats, [&](std::uint32_t i) { visible.push_back(i); },
-                    [&](std::uint32_t n) { nodes.push_back(n); });
+  step<kUndersides, kTerrain>(
+      tree.nodes[root], make_view(eye, map), map, seen, stats,
+      [&](std::uint32_t i) { visible.push_back(i); }, [&](std::uint32_t n) { nodes.push_back(n); });
 }
 
 template <bool kUndersides, bool kTerrain>
-void find(const BoxTree& tree, std::uint32_t root, const float eye[3], const PolarMap& map, std::vector<std::uint32_t>& visible,
-          PolarStats& stats) {
+void find(const BoxTree& tree, std::uint32_t root, const float eye[3], const PolarMap& map,
+          std::vector<std::uint32_t>& visible, PolarStats& stats) {
   const View view = make_view(eye, map);
   std::uint32_t stack[BoxTree::kWidth * 12];
   std::uint32_t size = 0;
@@ -686,27 +743,35 @@ void find(const BoxTree& tree, std::uint32_t root, const float eye[3], const Pol
   Seen seen;
   while (size != 0) {
     const BoxTree::Node& node = tree.nodes[stack[--size]];
-    step<kUndersides, kTerrain>(node, view, map, seen, stats, [&](std::uint32_t i) { visible.push_back(i); },
-                      [&](std::uint32_t n) { stack[size++] = n; });
+    step<kUndersides, kTerrain>(
+        node, view, map, seen, stats, [&](std::uint32_t i) { visible.push_back(i); },
+        [&](std::uint32_t n) { stack[size++] = n; });
   }
 }
 
-void find_children_target(const BoxTree& tree, std::uint32_t root, const float* eye, bool undersides, const PolarMap& map,
-                          std::vector<std::uint32_t>& visible, std::vector<std::uint32_t>& nodes, PolarStats& stats) {
-  choose(undersides, map, [&](auto u, auto t) { find_children<u, t>(tree, root, eye, map, visible, nodes, stats); });
+void find_children_target(const BoxTree& tree, std::uint32_t root, const float* eye,
+                          bool undersides, const PolarMap& map, std::vector<std::uint32_t>& visible,
+                          std::vector<std::uint32_t>& nodes, PolarStats& stats) {
+  choose(undersides, map,
+         [&](auto u, auto t) { find_children<u, t>(tree, root, eye, map, visible, nodes, stats); });
 }
 
-void draw_walls_target(const WallSet& walls, const float* eye, const Floors& floors, std::span<const std::uint32_t> only,
-                       const PolarGuards& guards, PolarMap& map, PolarStats& stats) {
-  choose(floors.undersides, map, [&](auto u, auto t) { draw<u, t>(walls, eye, floors, only, guards, map, stats); });
+void draw_walls_target(const WallSet& walls, const float* eye, const Floors& floors,
+                       std::span<const std::uint32_t> only, const PolarGuards& guards,
+                       PolarMap& map, PolarStats& stats) {
+  choose(floors.undersides, map,
+         [&](auto u, auto t) { draw<u, t>(walls, eye, floors, only, guards, map, stats); });
 }
 
-void find_visible_target(const BoxTree& tree, std::uint32_t root, const float* eye, bool undersides, const PolarMap& map,
-                         std::vector<std::uint32_t>& visible, PolarStats& stats) {
-  choose(undersides, map, [&](auto u, auto t) { find<u, t>(tree, root, eye, map, visible, stats); });
+void find_visible_target(const BoxTree& tree, std::uint32_t root, const float* eye, bool undersides,
+                         const PolarMap& map, std::vector<std::uint32_t>& visible,
+                         PolarStats& stats) {
+  choose(undersides, map,
+         [&](auto u, auto t) { find<u, t>(tree, root, eye, map, visible, stats); });
 }
 
-// A block's statement in layer k is the weakest of its bins' statements in layer k: it holds for all of them.
+// A block's statement in layer k is the weakest of its bins' statements in layer k: it holds for
+// all of them.
 void finish_target(PolarMap& map, bool undersides) {
   const D d;
   const std::uint32_t blocks = map.bins() / PolarMap::kBlock;
@@ -716,14 +781,17 @@ void finish_target(PolarMap& map, bool undersides) {
       float* to = map.coarse() + (3 * k + plane) * std::size_t{map.coarse_stride()};
       for (std::uint32_t b = 0; b < blocks; ++b, from += PolarMap::kBlock) {
         V m = hn::LoadU(d, from);
-        for (std::uint32_t l = static_cast<std::uint32_t>(hn::Lanes(d)); l < PolarMap::kBlock; l += static_cast<std::uint32_t>(hn::Lanes(d)))
+        for (std::uint32_t l = static_cast<std::uint32_t>(hn::Lanes(d)); l < PolarMap::kBlock;
+             l += static_cast<std::uint32_t>(hn::Lanes(d)))
           m = plane == 2 ? hn::Max(m, hn::LoadU(d, from + l)) : hn::Min(m, hn::LoadU(d, from + l));
         to[b] = hn::GetLane(plane == 2 ? hn::MaxOfLanes(d, m) : hn::MinOfLanes(d, m));
       }
     }
 }
 
-const char* target_name() { return hwy::TargetName(HWY_TARGET); }
+const char* target_name() {
+  return hwy::TargetName(HWY_TARGET);
+}
 
 }  // namespace
 }  // namespace ivis::HWY_NAMESPACE
@@ -740,7 +808,8 @@ HWY_EXPORT(target_name);
 
 PolarMap::PolarMap(std::uint32_t bins_a_face)
     : bins_(4 * bins_a_face),
-      stride_(bins_ + kPad + kBlock + 16),  // off powers of two, so that planes do not share cache sets
+      stride_(bins_ + kPad + kBlock +
+              16),  // off powers of two, so that planes do not share cache sets
       coarse_stride_(bins_ / kBlock + kBlock + 16) {
   IVIS_ASSERT(std::has_single_bit(bins_a_face) && bins_a_face >= 64 && bins_a_face <= 8192,
               "bins a face: a power of two from 64 to 8192");
@@ -767,23 +836,29 @@ void PolarMap::finish(bool undersides) {
   HWY_DYNAMIC_DISPATCH(finish_target)(*this, undersides);
 }
 
-void draw_walls(const WallSet& walls, const float eye[3], const Floors& floors, std::span<const std::uint32_t> only,
-                const PolarGuards& guards, PolarMap& map, PolarStats& stats) {
+void draw_walls(const WallSet& walls, const float eye[3], const Floors& floors,
+                std::span<const std::uint32_t> only, const PolarGuards& guards, PolarMap& map,
+                PolarStats& stats) {
   HWY_DYNAMIC_DISPATCH(draw_walls_target)(walls, eye, floors, only, guards, map, stats);
 }
 
-void find_visible(const BoxTree& tree, std::uint32_t root, const float eye[3], bool undersides, const PolarMap& map,
-                  std::vector<std::uint32_t>& visible, PolarStats& stats) {
+void find_visible(const BoxTree& tree, std::uint32_t root, const float eye[3], bool undersides,
+                  const PolarMap& map, std::vector<std::uint32_t>& visible, PolarStats& stats) {
   if (tree.nodes.empty()) return;
   HWY_DYNAMIC_DISPATCH(find_visible_target)(tree, root, eye, undersides, map, visible, stats);
 }
 
-void find_visible_children(const BoxTree& tree, std::uint32_t root, const float eye[3], bool undersides, const PolarMap& map,
-                           std::vector<std::uint32_t>& visible, std::vector<std::uint32_t>& nodes, PolarStats& stats) {
-  HWY_DYNAMIC_DISPATCH(find_children_target)(tree, root, eye, undersides, map, visible, nodes, stats);
+void find_visible_children(const BoxTree& tree, std::uint32_t root, const float eye[3],
+                           bool undersides, const PolarMap& map,
+                           std::vector<std::uint32_t>& visible, std::vector<std::uint32_t>& nodes,
+                           PolarStats& stats) {
+  HWY_DYNAMIC_DISPATCH(find_children_target)
+  (tree, root, eye, undersides, map, visible, nodes, stats);
 }
 
-const char* simd_target() { return HWY_DYNAMIC_DISPATCH(target_name)(); }
+const char* simd_target() {
+  return HWY_DYNAMIC_DISPATCH(target_name)();
+}
 
 }  // namespace ivis
 #endif  // HWY_ONCE

@@ -33,16 +33,18 @@ struct WallSet {
 /// Sampled polar occlusion about an eye: what blocks each azimuth, how high and from how far on.
 ///
 /// Azimuth: the ground plane is cut into four faces of a square about the eye, in each of which
-/// u = side / depth in [-1, 1]; t = face * 2 + u + 1 runs from 0 to 8 once around, from +X towards +Z.
-/// Distance of a point is w = max(|x|, |z|) from the eye; slope is y / w. Along a wall 1/w is linear in u.
+/// u = side / depth in [-1, 1]; t = face * 2 + u + 1 runs from 0 to 8 once around, from +X towards
+/// +Z. Distance of a point is w = max(|x|, |z|) from the eye; slope is y / w. Along a wall 1/w is
+/// linear in u.
 ///
-/// A bin holds up to kLayers statements (S, W, B): every azimuth of the bin crosses a wall of a shrunk
-/// solid at 1/w >= W, which there spans at least the slopes B..S. So a point of slope in [B, S] and
-/// 1/w <= W is behind the wall: the segment from the eye meets the shrunk solid no farther than the
-/// point. Any statement may be dropped; statements are sorted by falling S.
+/// A bin holds up to kLayers statements (S, W, B): every azimuth of the bin crosses a wall of a
+/// shrunk solid at 1/w >= W, which there spans at least the slopes B..S. So a point of slope in [B,
+/// S] and 1/w <= W is behind the wall: the segment from the eye meets the shrunk solid no farther
+/// than the point. Any statement may be dropped; statements are sorted by falling S.
 ///
-/// Terrain speaks beside the bins, by a Horizon: of each azimuth and distance, a slope below which all is
-/// hidden. A statement of a bin and the horizon block their union: a wall's low end may lie under the horizon.
+/// Terrain speaks beside the bins, by a Horizon: of each azimuth and distance, a slope below which
+/// all is hidden. A statement of a bin and the horizon block their union: a wall's low end may lie
+/// under the horizon.
 ///
 /// Source:  Wonka, Wimmer, Sillion 2001, section 5.1 (cull map). Departs: polar instead of
 ///          orthographic, several layers a bin, real undersides.
@@ -51,7 +53,8 @@ class PolarMap {
  public:
   static constexpr std::uint32_t kLayers = 2;
   static constexpr std::uint32_t kBlock = 16;  ///< bins that share coarse minima
-  static constexpr std::uint32_t kPad = 64;    ///< bins repeated behind the last, so that short runs do not wrap
+  static constexpr std::uint32_t kPad =
+      64;  ///< bins repeated behind the last, so that short runs do not wrap
 
   /// bins_a_face: power of two, 64..8192.
   explicit PolarMap(std::uint32_t bins_a_face);
@@ -69,10 +72,13 @@ class PolarMap {
   float* slope(std::uint32_t layer) { return data_[0].v + layer * std::size_t{3} * stride_; }
   float* near_inverse(std::uint32_t layer) { return slope(layer) + stride_; }
   float* low(std::uint32_t layer) { return slope(layer) + 2 * std::size_t{stride_}; }
-  const float* slope(std::uint32_t layer) const { return data_[0].v + layer * std::size_t{3} * stride_; }
+  const float* slope(std::uint32_t layer) const {
+    return data_[0].v + layer * std::size_t{3} * stride_;
+  }
   const float* near_inverse(std::uint32_t layer) const { return slope(layer) + stride_; }
   const float* low(std::uint32_t layer) const { return slope(layer) + 2 * std::size_t{stride_}; }
-  /// Terrain for the solve at hand; null for none. Borrowed; set it before anything is drawn or asked.
+  /// Terrain for the solve at hand; null for none. Borrowed; set it before anything is drawn or
+  /// asked.
   void set_horizon(const Horizon* horizon) { horizon_ = horizon; }
   const Horizon* horizon() const { return horizon_; }
   float* coarse() { return coarse_[0].v; }
@@ -91,7 +97,8 @@ class PolarMap {
   std::vector<Line> coarse_;  ///< likewise over blocks of kBlock bins
 };
 
-/// Which solids reach down without end for the cell at hand (occluders/occluder_set.h, extends_down).
+/// Which solids reach down without end for the cell at hand (occluders/occluder_set.h,
+/// extends_down).
 struct Floors {
   bool above_floor = false;
   bool on_ground = false;
@@ -106,28 +113,34 @@ struct PolarStats {
   std::uint32_t nodes_tested = 0;
 };
 
-/// Guards of the map that tests take out one by one to prove that the verifier has power. All on in use.
+/// Guards of the map that tests take out one by one to prove that the verifier has power. All on in
+/// use.
 struct PolarGuards {
   bool cover_whole_bins = true;  ///< write only bins that walls cover fully
   bool least_over_bin = true;    ///< take the least slope and the farthest point over a bin
   bool test_distance = true;     ///< hide only what is farther than the wall
   bool respect_undersides = true;
-  bool far_end_below_eye = true;  ///< of tops lower than the eye, take the slope that holds over the bin
+  bool far_end_below_eye =
+      true;  ///< of tops lower than the eye, take the slope that holds over the bin
 };
 
-/// Draws the walls that can be seen past those already drawn, near ones first. `eye` is relative to the tree's
-/// origin and is the apex of the cell. `only`: if not empty, just these solids are drawn, in this order.
-void draw_walls(const WallSet& walls, const float eye[3], const Floors& floors, std::span<const std::uint32_t> only,
-                const PolarGuards& guards, PolarMap& map, PolarStats& stats);
+/// Draws the walls that can be seen past those already drawn, near ones first. `eye` is relative to
+/// the tree's origin and is the apex of the cell. `only`: if not empty, just these solids are
+/// drawn, in this order.
+void draw_walls(const WallSet& walls, const float eye[3], const Floors& floors,
+                std::span<const std::uint32_t> only, const PolarGuards& guards, PolarMap& map,
+                PolarStats& stats);
 
 /// Appends to `visible` the items of the tree below `root` that the map does not hide; any order.
 void find_visible(const BoxTree& tree, std::uint32_t root, const float eye[3], bool undersides,
                   const PolarMap& map, std::vector<std::uint32_t>& visible, PolarStats& stats);
 
-/// One step of find_visible(): appends the visible items of node `root` to `visible`, its visible children
-/// to `nodes`.
-void find_visible_children(const BoxTree& tree, std::uint32_t root, const float eye[3], bool undersides, const PolarMap& map,
-                           std::vector<std::uint32_t>& visible, std::vector<std::uint32_t>& nodes, PolarStats& stats);
+/// One step of find_visible(): appends the visible items of node `root` to `visible`, its visible
+/// children to `nodes`.
+void find_visible_children(const BoxTree& tree, std::uint32_t root, const float eye[3],
+                           bool undersides, const PolarMap& map,
+                           std::vector<std::uint32_t>& visible, std::vector<std::uint32_t>& nodes,
+                           PolarStats& stats);
 
 /// Name of the SIMD target in use, for reports.
 const char* simd_target();

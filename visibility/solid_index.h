@@ -7,9 +7,9 @@
 
 namespace ivis {
 
-/// Finds whether an unshrunk solid or a closed box holds a point. A uniform grid over the ground plane.
-/// Threads: read-only after construction. Ownership: borrows the occluders.
-/// Cost: O(solids) to build; a query looks at the solids over one grid cell.
+/// Finds whether an unshrunk solid or a closed box holds a point. A uniform grid over the ground
+/// plane. Threads: read-only after construction. Ownership: borrows the occluders. Cost: O(solids)
+/// to build; a query looks at the solids over one grid cell.
 class SolidIndex {
  public:
   explicit SolidIndex(const OccluderSet& occluders);
@@ -24,7 +24,7 @@ class SolidIndex {
   double cell_m_ = 1;
   std::size_t columns_ = 0;
   std::size_t rows_ = 0;
-  std::vector<std::uint32_t> start_;   ///< of each grid cell in solids_
+  std::vector<std::uint32_t> start_;  ///< of each grid cell in solids_
   std::vector<std::uint32_t> solids_;
 };
 

@@ -8,9 +8,11 @@
 namespace ivis {
 namespace {
 
-constexpr double kLeastSizeM = 1;           ///< smaller objects have one box
-constexpr std::size_t kMostTriangles = 20000;  ///< larger meshes have one box: clusters are for them
-/// The parts' surfaces together must stay below this many times the one box's: those of what fills its box do not.
+constexpr double kLeastSizeM = 1;  ///< smaller objects have one box
+constexpr std::size_t kMostTriangles =
+    20000;  ///< larger meshes have one box: clusters are for them
+/// The parts' surfaces together must stay below this many times the one box's: those of what fills
+/// its box do not.
 constexpr double kWorthwhile = 1.1;
 
 using Ring = std::vector<Vec3>;
@@ -51,7 +53,8 @@ double surface(const Aabb& b) {
 Aabb bounds_of(const std::vector<Ring>& rings) {
   Aabb box;
   for (const Ring& r : rings)
-    for (const Vec3& p : r) box.add(p);
+    for (const Vec3& p : r)
+      box.add(p);
   return box;
 }
 
@@ -84,7 +87,8 @@ std::vector<Aabb> parts_of(const Scene& scene, const Object& o) {
     if (queue.top().longest() < 0.25 * kLeastSizeM) break;
   }
   std::vector<Aabb> boxes;
-  for (; !queue.empty(); queue.pop()) boxes.push_back(queue.top().box);
+  for (; !queue.empty(); queue.pop())
+    boxes.push_back(queue.top().box);
   return boxes;
 }
 
@@ -96,7 +100,8 @@ SubBoxes::SubBoxes(const Scene& scene, const Vec3& origin) : node_(scene.objects
     const Object& o = scene.objects[id];
     const std::size_t triangles = scene.mesh_of(o).triangles();
     const Vec3 size = o.bounds.size();
-    if (o.always_visible || triangles == 0 || triangles > kMostTriangles || std::max({size.x, size.y, size.z}) < kLeastSizeM)
+    if (o.always_visible || triangles == 0 || triangles > kMostTriangles ||
+        std::max({size.x, size.y, size.z}) < kLeastSizeM)
       continue;
     std::vector<Aabb> boxes = parts_of(scene, o);
     // Rounding of transforms and cuts, far below the slack.

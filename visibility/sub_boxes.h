@@ -8,9 +8,9 @@
 
 namespace ivis {
 
-/// Up to sixteen boxes that together hold an object's triangles, for objects whose one box is a poor bound: large ones
-/// that fill little of it, such as walls and floors seen at a slant. What hides all of an object's boxes hides the object.
-/// Threads: read-only after construction.
+/// Up to sixteen boxes that together hold an object's triangles, for objects whose one box is a
+/// poor bound: large ones that fill little of it, such as walls and floors seen at a slant. What
+/// hides all of an object's boxes hides the object. Threads: read-only after construction.
 class SubBoxes {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffU;
@@ -18,7 +18,8 @@ class SubBoxes {
   /// Boxes relative to `origin`, as BoxTree's. Cost: O(triangles of large objects x 16).
   SubBoxes(const Scene& scene, const Vec3& origin);
 
-  /// The node of `tree()` whose children are the object's boxes, or kNone. Its items are the object's id.
+  /// The node of `tree()` whose children are the object's boxes, or kNone. Its items are the
+  /// object's id.
   std::uint32_t node_of(ObjectId id) const { return node_[id]; }
   const BoxTree& tree() const { return tree_; }
 

@@ -33,8 +33,10 @@ TEST_F(PathFile, RoundTripsToATenthOfAMillimetre) {
 TEST_F(PathFile, NamesLineColumnAndValueOfWhatIsWrong) {
   const auto bad = read("x,y,z\n1,2,3\n1,two,3\n");
   ASSERT_FALSE(bad);
-  EXPECT_NE(bad.error().message.find("line 3, column 'y': found 'two'"), std::string::npos) << bad.error().message;
-  for (const char* text : {"", "x,y\n1,2\n", "x,y,z\n", "x,y,z\n1,2\n", "x,y,z\n1,2,nan\n", "x,y,z\n1,2,inf\n"})
+  EXPECT_NE(bad.error().message.find("line 3, column 'y': found 'two'"), std::string::npos)
+      << bad.error().message;
+  for (const char* text :
+       {"", "x,y\n1,2\n", "x,y,z\n", "x,y,z\n1,2\n", "x,y,z\n1,2,nan\n", "x,y,z\n1,2,inf\n"})
     EXPECT_FALSE(read(text)) << text;
 }
 

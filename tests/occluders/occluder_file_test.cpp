@@ -35,7 +35,8 @@ OccluderSet example() {
   const FaceMesh square{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2, 3}}};
   set.margins_m = {0.1, 0.25};
   set.prism_pieces = {{{{{triangle, 0.5, 7, 0, true}}, {}}}};
-  set.solid_pieces = {{{tetrahedron, {}}, {{{0, -1, 0}, 0.5}}, {tetrahedron}}, {{tetrahedron}, {}, {}}};
+  set.solid_pieces = {{{tetrahedron, {}}, {{{0, -1, 0}, 0.5}}, {tetrahedron}},
+                      {{tetrahedron}, {}, {}}};
   set.sheet_radii_m = {0.5};
   set.sheets = {{{0, 0.6, 0.8}, 3.5, {square}}};
   set.height_field = {{-1, 2}, {0.5, 0.25}, 2, 3, {1, 2, 3, 4.5F, HeightField::kNone, 6}};

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <new>
 
 #include "tests/support/scene_builder.h"
 #include "visibility/method.h"
@@ -20,6 +21,7 @@ class NearMethod : public Method {
     Pvs pvs;
     pvs.cell = cell;
     pvs.scene_hash = scene_.hash;
+    if (cell.eye.y < -500) throw std::bad_alloc();
     if (cell.eye.y < -50) return invalid_argument("below the world");
     const bool everything = cell.eye.y > 50;
     if (everything) pvs.everything_because = "above the world";

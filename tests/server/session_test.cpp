@@ -208,6 +208,11 @@ TEST_F(Sessions, UnsolvablePoseIsAnsweredWithEverything) {
   EXPECT_TRUE(next_pvs(a).everything);
   pose(a, 3, {4, 1, 4}, 0);
   EXPECT_EQ(ids(a, next_pvs(a)), truth({4, 1, 4}));
+  pose(a, 4, {4, -600, 4});
+  EXPECT_TRUE(next_pvs(a).everything) << "the method throws";
+  EXPECT_EQ(table().counters().solve_errors, 2U);
+  pose(a, 5, {4, 1, 4}, 0);
+  EXPECT_EQ(ids(a, next_pvs(a)), truth({4, 1, 4}));
 }
 
 TEST_F(Sessions, RefusesUnknownSession) {

@@ -16,7 +16,8 @@ void close(Mesh& mesh, bool opaque = true) {
 /// Ear clipping of a simple ring with positive shoelace area; test scenes only.
 void triangulate(const std::vector<Vec2>& ring, const auto& emit) {
   std::vector<std::uint32_t> left(ring.size());
-  for (std::uint32_t i = 0; i < left.size(); ++i) left[i] = i;
+  for (std::uint32_t i = 0; i < left.size(); ++i)
+    left[i] = i;
   const auto cross = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
     const Vec2 u = ring[b] - ring[a];
     const Vec2 v = ring[c] - ring[a];
@@ -31,7 +32,9 @@ void triangulate(const std::vector<Vec2>& ring, const auto& emit) {
       if (cross(a, b, c) <= 0) continue;
       bool ear = true;
       for (const auto p : left)
-        if (p != a && p != b && p != c && cross(a, b, p) >= 0 && cross(b, c, p) >= 0 && cross(c, a, p) >= 0) ear = false;
+        if (p != a && p != b && p != c && cross(a, b, p) >= 0 && cross(b, c, p) >= 0 &&
+            cross(c, a, p) >= 0)
+          ear = false;
       if (!ear) continue;
       emit(a, b, c);
       left.erase(left.begin() + static_cast<std::ptrdiff_t>(i));
@@ -59,15 +62,21 @@ ObjectId SceneBuilder::add_mesh(Mesh mesh, OccluderTag tag, const Mat4& to_world
   return static_cast<ObjectId>(scene_.objects.size() - 1);
 }
 
-void SceneBuilder::name_last(const std::string& name) { scene_.node_names.back() = name; }
+void SceneBuilder::name_last(const std::string& name) {
+  scene_.node_names.back() = name;
+}
 
-ObjectId SceneBuilder::add_prism(const std::vector<Vec2>& ring, double bottom, double top, OccluderTag tag) {
+ObjectId SceneBuilder::add_prism(const std::vector<Vec2>& ring, double bottom, double top,
+                                 OccluderTag tag) {
   Mesh mesh;
   const auto n = static_cast<std::uint32_t>(ring.size());
   for (const double y : {bottom, top})
-    for (const Vec2& p : ring) mesh.positions.emplace_back(p.x, y, p.y);
-  // Positive area in (x, z) with z up the page is clockwise seen from above (+Y towards the reader).
-  for (std::uint32_t i = 0; i < n; ++i) add_quad(mesh, i, n + i, n + (i + 1) % n, (i + 1) % n);
+    for (const Vec2& p : ring)
+      mesh.positions.emplace_back(p.x, y, p.y);
+  // Positive area in (x, z) with z up the page is clockwise seen from above (+Y towards the
+  // reader).
+  for (std::uint32_t i = 0; i < n; ++i)
+    add_quad(mesh, i, n + i, n + (i + 1) % n, (i + 1) % n);
   triangulate(ring, [&](auto a, auto b, auto c) {
     mesh.indices.insert(mesh.indices.end(), {a, b, c, n + a, n + c, n + b});
   });
@@ -76,7 +85,8 @@ ObjectId SceneBuilder::add_prism(const std::vector<Vec2>& ring, double bottom, d
 }
 
 ObjectId SceneBuilder::add_box(const Vec3& lo, const Vec3& hi, OccluderTag tag, bool opaque) {
-  const ObjectId id = add_prism({{lo.x, lo.z}, {hi.x, lo.z}, {hi.x, hi.z}, {lo.x, hi.z}}, lo.y, hi.y, tag);
+  const ObjectId id =
+      add_prism({{lo.x, lo.z}, {hi.x, lo.z}, {hi.x, hi.z}, {lo.x, hi.z}}, lo.y, hi.y, tag);
   scene_.meshes.back().primitives[0].opaque = opaque;
   return id;
 }

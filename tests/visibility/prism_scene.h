@@ -7,8 +7,8 @@
 
 namespace ivis::test {
 
-/// Upright convex prisms that occlude and small boxes that do not, with the exact erosion of each prism worked out
-/// apart from the project's builders (half-planes moved inwards).
+/// Upright convex prisms that occlude and small boxes that do not, with the exact erosion of each
+/// prism worked out apart from the project's builders (half-planes moved inwards).
 struct PrismScene {
   struct Solid {
     std::vector<Vec2> ring;  ///< convex, positive area
@@ -19,7 +19,8 @@ struct PrismScene {
   OccluderSet occluders;
 };
 
-/// The convex ring with every side moved inwards by the reach's support there; empty if nothing is left.
+/// The convex ring with every side moved inwards by the reach's support there; empty if nothing is
+/// left.
 inline std::vector<Vec2> erode_convex(const std::vector<Vec2>& ring, const Reach& reach) {
   std::vector<Vec2> kept = ring;
   for (std::size_t i = 0; i < ring.size(); ++i) {
@@ -42,19 +43,25 @@ inline std::vector<Vec2> erode_convex(const std::vector<Vec2>& ring, const Reach
   return kept;
 }
 
-/// A scene of the given solids and boxes, shrunk for `reach`. The floor rule holds as in the product.
-inline PrismScene make_prism_scene(const std::vector<PrismScene::Solid>& solids, const std::vector<Aabb>& boxes, const Reach& reach) {
+/// A scene of the given solids and boxes, shrunk for `reach`. The floor rule holds as in the
+/// product.
+inline PrismScene make_prism_scene(const std::vector<PrismScene::Solid>& solids,
+                                   const std::vector<Aabb>& boxes, const Reach& reach) {
   PrismScene out;
   out.solids = solids;
   SceneBuilder builder;
-  for (const auto& s : solids) builder.add_prism(s.ring, s.bottom, s.top);
-  for (const Aabb& b : boxes) builder.add_box(b.lo, b.hi, OccluderTag::kNever);
+  for (const auto& s : solids)
+    builder.add_prism(s.ring, s.bottom, s.top);
+  for (const Aabb& b : boxes)
+    builder.add_box(b.lo, b.hi, OccluderTag::kNever);
   out.scene = std::move(builder).finish();
   out.occluders.scene_hash = out.scene.hash;
   out.occluders.reach = reach;
   out.occluders.floor = std::numeric_limits<double>::infinity();
-  for (const auto& solid : solids) out.occluders.floor = std::min(out.occluders.floor, solid.bottom);
-  for (const Aabb& b : boxes) out.occluders.floor = std::min(out.occluders.floor, b.lo.y);
+  for (const auto& solid : solids)
+    out.occluders.floor = std::min(out.occluders.floor, solid.bottom);
+  for (const Aabb& b : boxes)
+    out.occluders.floor = std::min(out.occluders.floor, b.lo.y);
   const Reach margin = padded(reach, out.occluders.slack_m);
   for (const auto& s : solids) {
     Prism prism;
@@ -78,9 +85,12 @@ inline bool blocked(const PrismScene& s, const Vec3& q, const Vec3& y) {
     double t0 = 0;
     double t1 = 1;
     const auto clip = [&](double at_q, double at_y) {  // keep where the value is >= 0
-      if (at_q < 0 && at_y < 0) t1 = -1;
-      else if (at_q < 0) t0 = std::max(t0, at_q / (at_q - at_y));
-      else if (at_y < 0) t1 = std::min(t1, at_q / (at_q - at_y));
+      if (at_q < 0 && at_y < 0)
+        t1 = -1;
+      else if (at_q < 0)
+        t0 = std::max(t0, at_q / (at_q - at_y));
+      else if (at_y < 0)
+        t1 = std::min(t1, at_q / (at_q - at_y));
     };
     clip(solid.top - q.y, solid.top - y.y);
     clip(q.y - solid.bottom, y.y - solid.bottom);
