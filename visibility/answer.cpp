@@ -23,12 +23,11 @@ Pvs empty_answer(const Scene& scene, const ViewCell& cell) {
   return pvs;
 }
 
-std::string why_everything(const Vec3& eye, const Vec3& origin, const SolidIndex& solids,
+std::string why_everything(const Vec3& eye, const Vec3& map_eye, const SolidIndex& solids,
                            double slack_m) {
   if (solids.holds(eye)) return "eye inside an occluder";
-  const Vec3 local = eye - origin;
   for (int i = 0; i < 3; ++i)
-    if (std::abs(local[i] - static_cast<double>(static_cast<float>(local[i]))) > 0.5 * slack_m)
+    if (std::abs(map_eye[i] - static_cast<double>(static_cast<float>(map_eye[i]))) > 0.5 * slack_m)
       return "eye too far from the scene for single precision";
   return {};
 }

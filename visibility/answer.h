@@ -21,9 +21,9 @@ Status check_cell(const ViewCell& cell, const OccluderSet& occluders);
 Pvs empty_answer(const Scene& scene, const ViewCell& cell);
 
 /// Why everything must be listed for this cell; empty if that need not be: the eye is in no solid,
-/// and subtracting boxes from the eye (relative to `origin`, where maps hold both in single
-/// precision) errs by less than the slack.
-std::string why_everything(const Vec3& eye, const Vec3& origin, const SolidIndex& solids,
+/// and subtracting boxes from the eye (both in single precision, in the coordinates of the map,
+/// where the eye is `map_eye`) errs by less than the slack.
+std::string why_everything(const Vec3& eye, const Vec3& map_eye, const SolidIndex& solids,
                            double slack_m);
 
 /// Every object of the scene, because of `why`.

@@ -49,7 +49,7 @@ class Maker {
     p.first_floor = static_cast<std::uint32_t>(out_.floors.size());
     p.floors = static_cast<std::uint32_t>(piece.floors.size());
     for (ConvexSolid::Plane plane : piece.floors) {
-      plane.offset -= glm::dot(plane.normal, out_.origin);
+      plane.offset -= glm::dot(plane.normal, out_.frame.origin);
       out_.floors.push_back(plane);
     }
     const auto add = [&](const std::vector<FaceMesh>& levels) {
@@ -70,11 +70,11 @@ class Maker {
     OccluderPieces::Piece p;
     begin(p);
     p.kind = OccluderPieces::Kind::kSheet;
-    p.normal = sheet.normal;
-    p.offset = sheet.offset - glm::dot(sheet.normal, out_.origin);
+    p.normal = out_.frame.direction(sheet.normal);
+    p.offset = sheet.offset - glm::dot(sheet.normal, out_.frame.origin);
     for (const FaceMesh& mesh : sheet.levels) {
       open_level();
-      add_mesh(mesh, &sheet.normal);
+      add_mesh(mesh, &p.normal);
     }
     p.levels = static_cast<std::uint32_t>(sheet.levels.size());
     p.first_real_level = p.first_level;
@@ -85,7 +85,7 @@ class Maker {
     std::vector<std::uint32_t> items(boxes_.size());
     for (std::uint32_t i = 0; i < items.size(); ++i)
       items[i] = i;
-    out_.tree = BoxTree::build(boxes_, items, out_.origin);
+    out_.tree = BoxTree::build(boxes_, items, Vec3{0});
   }
 
  private:
@@ -97,8 +97,8 @@ class Maker {
   void end(OccluderPieces::Piece p) {
     if (drawn_.empty()) return;
     for (int i = 0; i < 3; ++i) {
-      p.lo[i] = static_cast<float>(drawn_.lo[i] - out_.origin[i]);
-      p.hi[i] = static_cast<float>(drawn_.hi[i] - out_.origin[i]);
+      p.lo[i] = static_cast<float>(drawn_.lo[i]);
+      p.hi[i] = static_cast<float>(drawn_.hi[i]);
     }
     // What stands below a prism's real bottom is not worth drawing it for.
     boxes_.push_back(box_.empty() ? drawn_ : box_);
@@ -113,7 +113,8 @@ class Maker {
     open_level();
     for (Prism prism : prisms) {
       if (down) {
-        box_.add(prism.bounds());
+        for (const Vec3& c : mesh_of(prism).points)
+          box_.add(out_.frame.to_map(c));
         prism.bottom = std::min(prism.bottom, deep);
       }
       add_mesh(mesh_of(prism));
@@ -124,7 +125,7 @@ class Maker {
     for (const auto& face : mesh.faces) {
       Vec3 p[4];
       for (std::size_t k = 0; k < 4; ++k)
-        p[k] = mesh.points[face[k]];
+        p[k] = out_.frame.to_map(mesh.points[face[k]]);
       // Of two diagonals: right for a triangle too.
       Vec3 n = glm::cross(p[2] - p[0], p[3] - p[1]);
       const double length = glm::length(n);
@@ -133,10 +134,9 @@ class Maker {
       if (lane_ == FaceBatch::kWidth) open_batch();
       FaceBatch& b = out_.batches.back();
       for (std::size_t k = 0; k < 4; ++k) {
-        const Vec3 q = p[k] - out_.origin;
-        b.x[k][lane_] = static_cast<float>(q.x);
-        b.y[k][lane_] = static_cast<float>(q.y);
-        b.z[k][lane_] = static_cast<float>(q.z);
+        b.x[k][lane_] = static_cast<float>(p[k].x);
+        b.y[k][lane_] = static_cast<float>(p[k].y);
+        b.z[k][lane_] = static_cast<float>(p[k].z);
         drawn_.add(p[k]);
       }
       b.nx[lane_] = static_cast<float>(n.x);
@@ -161,9 +161,10 @@ class Maker {
 
 }  // namespace
 
-OccluderPieces make_pieces(const Scene& scene, const OccluderSet& occluders, const Vec3& origin) {
+OccluderPieces make_pieces(const Scene& scene, const OccluderSet& occluders,
+                           const MapFrame& frame) {
   OccluderPieces out;
-  out.origin = origin;
+  out.frame = frame;
   out.margins_m = occluders.margins_m;
   out.sheet_radii_m = occluders.sheet_radii_m;
   Maker maker(occluders, out);

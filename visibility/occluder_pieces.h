@@ -8,11 +8,12 @@
 #include "scenes/scene.h"
 #include "visibility/box_tree.h"
 #include "visibility/depth_cube.h"
+#include "visibility/map_frame.h"
 
 namespace ivis {
 
-/// An occluder set's pieces and sheets as the depth cube draws them: single precision relative to
-/// `origin`.
+/// An occluder set's pieces and sheets as the depth cube draws them: single precision in map
+/// coordinates.
 struct OccluderPieces {
   /// When a piece may be drawn as it is.
   enum class Kind : std::uint8_t {
@@ -35,17 +36,17 @@ struct OccluderPieces {
     std::uint32_t first_floor =
         0;  ///< of a solid: half-spaces that the cell must lie in, or else it is drawn as it stands
     std::uint32_t floors = 0;
-    // Of a sheet: it is { x : normal.x = offset } relative to the origin.
+    // Of a sheet: it is { x : normal.x = offset } in map coordinates.
     Vec3 normal{0};
     double offset = 0;
   };
 
-  Vec3 origin{0};
+  MapFrame frame;
   std::vector<double> margins_m;
   std::vector<double> sheet_radii_m;
   std::vector<FaceBatch> batches;
   std::vector<Level> levels;
-  std::vector<ConvexSolid::Plane> floors;  ///< relative to `origin`
+  std::vector<ConvexSolid::Plane> floors;  ///< relative to the frame's origin, not turned
   std::vector<Piece> pieces;
   BoxTree tree;  ///< of the pieces; items are indices into `pieces`
 
@@ -55,6 +56,6 @@ struct OccluderPieces {
 };
 
 /// Cost: O(faces). Ownership: keeps nothing of its arguments.
-OccluderPieces make_pieces(const Scene& scene, const OccluderSet& occluders, const Vec3& origin);
+OccluderPieces make_pieces(const Scene& scene, const OccluderSet& occluders, const MapFrame& frame);
 
 }  // namespace ivis

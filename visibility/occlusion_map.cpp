@@ -48,11 +48,12 @@ OcclusionMap::OcclusionMap(const Scene& scene, const OccluderSet& occluders,
       occluders_(occluders),
       options_(options),
       guards_(guards),
-      origin_(scene.bounds.empty() ? Vec3{0} : scene.bounds.centre()),
+      frame_(choose_frame(scene, occluders.slack_m)),
+      bounds_(bounds_in(frame_, scene)),
       pixels_(pixels_for(options.map_pixels, occluders.reach)),
       near_m_(near_for(occluders.reach)),
-      sub_boxes_(scene, origin_),
-      pieces_(make_pieces(scene, occluders, origin_)),
+      sub_boxes_(scene, frame_),
+      pieces_(make_pieces(scene, occluders, frame_)),
       solids_(occluders) {
   std::vector<Aabb> boxes;
   std::vector<std::uint32_t> ids;
@@ -61,11 +62,11 @@ OcclusionMap::OcclusionMap(const Scene& scene, const OccluderSet& occluders,
     if (o.always_visible) {
       always_visible_.push_back(id);
     } else {
-      boxes.push_back(o.bounds);
+      boxes.push_back(bounds_in(frame_, scene, o));
       ids.push_back(id);
     }
   }
-  objects_ = BoxTree::build(boxes, ids, origin_);
+  objects_ = BoxTree::build(boxes, ids, Vec3{0});
 }
 
 OcclusionMap::~OcclusionMap() = default;
@@ -102,19 +103,19 @@ Result<Pvs> OcclusionMap::solve(const ViewCell& cell) const {
 Result<Pvs> OcclusionMap::solve(const ViewCell& cell, Stats& stats) const {
   if (auto s = check_cell(cell, occluders_); !s) return s.error();
   Pvs pvs = empty_answer(scene_, cell);
-  if (auto why = why_everything(cell.eye, origin_, solids_, occluders_.slack_m); !why.empty()) {
+  Cell c{make_map_cell(cell, frame_, occluders_), 0};
+  if (auto why = why_everything(cell.eye, c.eye, solids_, occluders_.slack_m); !why.empty()) {
     list_everything(scene_, std::move(why), pvs);
     return pvs;
   }
-  Cell c{make_map_cell(cell, origin_, occluders_), 0};
 
   auto scratch = take_scratch();
   scratch->cube.clear();
   glm::vec3 lo;
   glm::vec3 hi;
   for (int i = 0; i < 3; ++i) {
-    lo[i] = static_cast<float>(scene_.bounds.lo[i] - cell.eye[i]) - 1.0F;  // more than rounding
-    hi[i] = static_cast<float>(scene_.bounds.hi[i] - cell.eye[i]) + 1.0F;
+    lo[i] = static_cast<float>(bounds_.lo[i] - c.eye[i]) - 1.0F;  // more than rounding
+    hi[i] = static_cast<float>(bounds_.hi[i] - c.eye[i]) + 1.0F;
   }
   c.sides = scratch->cube.look_at(lo, hi);
   scratch->visible.clear();

@@ -6,6 +6,7 @@
 
 #include "visibility/box_tree.h"
 #include "visibility/depth_cube.h"
+#include "visibility/map_frame.h"
 #include "visibility/method.h"
 #include "visibility/piece_choice.h"
 #include "visibility/solid_index.h"
@@ -20,8 +21,8 @@ namespace ivis {
 /// solve() is const and reentrant; the result does not depend on options.threads. Cost: O(visible
 /// hierarchy nodes + pixels of the occluders that show); bench/occlusion_map_bench.cpp. Source:
 /// Wonka, Wimmer, Sillion, Instant Visibility, 2001, section 5.2; pixel margin and sheets:
-/// docs/theory.md, 3, 9. Departs:   a cube instead of a widened frustum, so turning is free; each
-/// piece at the first margin of a ladder that
+/// docs/theory.md, 3, 9. Departs:   a cube instead of a widened frustum, so turning is free; turned
+/// to the scene's own axes (map_frame.h); each piece at the first margin of a ladder that
 ///            covers a pixel at its far side; sheets, which the paper's volumetric shrinking has no
 ///            place for.
 class OcclusionMap : public Method {
@@ -54,7 +55,8 @@ class OcclusionMap : public Method {
   const OccluderSet& occluders_;
   MethodOptions options_;
   OcclusionGuards guards_;
-  Vec3 origin_;
+  MapFrame frame_;
+  Aabb bounds_;  ///< of the scene, in map coordinates
   std::uint32_t pixels_;
   float near_m_;
   BoxTree objects_;

@@ -21,9 +21,10 @@ std::uint32_t pixels_for(std::uint32_t wanted, const Reach& reach) {
   return std::max({e.x, e.y, e.z}) < 0.5 ? 1024 : 512;
 }
 
-MapCell make_map_cell(const ViewCell& cell, const Vec3& origin, const OccluderSet& occluders) {
+MapCell make_map_cell(const ViewCell& cell, const MapFrame& frame, const OccluderSet& occluders) {
   MapCell c;
-  c.eye = cell.eye - origin;
+  c.local = cell.eye - frame.origin;
+  c.eye = frame.direction(c.local);
   for (int i = 0; i < 3; ++i)
     c.single[i] = static_cast<float>(c.eye[i]);
   c.reach = padded(cell.reach, occluders.slack_m);
@@ -75,7 +76,7 @@ PieceChoice choose_level(const OccluderPieces& pieces, const OccluderPieces::Pie
     first = piece.first_real_level;
   for (std::uint32_t f = piece.first_floor; f < piece.first_floor + piece.floors; ++f) {
     const ConvexSolid::Plane& floor = pieces.floors[f];
-    if (!(glm::dot(floor.normal, cell.eye) + cell.reach.support(floor.normal) <= floor.offset))
+    if (!(glm::dot(floor.normal, cell.local) + cell.reach.support(floor.normal) <= floor.offset))
       first = piece.first_real_level;
   }
   if (pieces.levels[first + level].batches == 0) return {};

@@ -19,16 +19,17 @@ struct OcclusionGuards {
       true;  ///< take a sheet's radius for the worst line of sight, not for a perpendicular one
 };
 
-/// The cell as occlusion maps want it: relative to the origin, seen from its centre.
+/// The cell as occlusion maps want it, seen from its centre.
 struct MapCell {
-  Vec3 eye{0};
+  Vec3 eye{0};  ///< in map coordinates
   float single[3] = {};
+  Vec3 local{0};      ///< relative to the frame's origin, not turned
   Reach reach;        ///< padded
   double radius = 0;  ///< of a ball about the eye that holds the cell
   bool above_floor = false;
   bool on_ground = false;
 };
-MapCell make_map_cell(const ViewCell& cell, const Vec3& origin, const OccluderSet& occluders);
+MapCell make_map_cell(const ViewCell& cell, const MapFrame& frame, const OccluderSet& occluders);
 
 /// Where a map's depth should be spent: what is nearer than this counts as visible.
 float near_for(const Reach& reach);

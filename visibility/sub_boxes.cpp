@@ -59,11 +59,11 @@ Aabb bounds_of(const std::vector<Ring>& rings) {
 }
 
 /// The longest part is halved again and again; every triangle's points end up in some part's box.
-std::vector<Aabb> parts_of(const Scene& scene, const Object& o) {
+std::vector<Aabb> parts_of(const MapFrame& frame, const Scene& scene, const Object& o) {
   Part whole;
   for (std::size_t t = 0; t < scene.mesh_of(o).triangles(); ++t) {
     const Triangle w = world_triangle(scene, o, t);
-    whole.rings.push_back({w.a, w.b, w.c});
+    whole.rings.push_back({frame.to_map(w.a), frame.to_map(w.b), frame.to_map(w.c)});
   }
   whole.box = bounds_of(whole.rings);
   std::priority_queue<Part> queue;
@@ -94,8 +94,7 @@ std::vector<Aabb> parts_of(const Scene& scene, const Object& o) {
 
 }  // namespace
 
-SubBoxes::SubBoxes(const Scene& scene, const Vec3& origin) : node_(scene.objects.size(), kNone) {
-  tree_.origin = origin;
+SubBoxes::SubBoxes(const Scene& scene, const MapFrame& frame) : node_(scene.objects.size(), kNone) {
   for (ObjectId id = 0; id < scene.objects.size(); ++id) {
     const Object& o = scene.objects[id];
     const std::size_t triangles = scene.mesh_of(o).triangles();
@@ -103,7 +102,7 @@ SubBoxes::SubBoxes(const Scene& scene, const Vec3& origin) : node_(scene.objects
     if (o.always_visible || triangles == 0 || triangles > kMostTriangles ||
         std::max({size.x, size.y, size.z}) < kLeastSizeM)
       continue;
-    std::vector<Aabb> boxes = parts_of(scene, o);
+    std::vector<Aabb> boxes = parts_of(frame, scene, o);
     // Rounding of transforms and cuts, far below the slack.
     const Vec3 far = glm::max(glm::abs(o.bounds.lo), glm::abs(o.bounds.hi));
     const double slack = 1e-9 * std::max({far.x, far.y, far.z}) + 1e-7;
@@ -113,9 +112,9 @@ SubBoxes::SubBoxes(const Scene& scene, const Vec3& origin) : node_(scene.objects
       b.hi += Vec3{slack};
       sum += surface(b);
     }
-    if (sum > kWorthwhile * surface(o.bounds)) continue;
+    if (sum > kWorthwhile * surface(bounds_in(frame, scene, o))) continue;
     const std::vector<std::uint32_t> items(boxes.size(), id);
-    BoxTree one = BoxTree::build(boxes, items, origin);
+    BoxTree one = BoxTree::build(boxes, items, Vec3{0});
     node_[id] = static_cast<std::uint32_t>(tree_.nodes.size());
     tree_.nodes.push_back(one.nodes.front());
   }

@@ -5,6 +5,7 @@
 
 #include "scenes/scene.h"
 #include "visibility/box_tree.h"
+#include "visibility/map_frame.h"
 
 namespace ivis {
 
@@ -15,8 +16,8 @@ class SubBoxes {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffU;
 
-  /// Boxes relative to `origin`, as BoxTree's. Cost: O(triangles of large objects x 16).
-  SubBoxes(const Scene& scene, const Vec3& origin);
+  /// Boxes in map coordinates. Cost: O(triangles of large objects x 16).
+  SubBoxes(const Scene& scene, const MapFrame& frame);
 
   /// The node of `tree()` whose children are the object's boxes, or kNone. Its items are the
   /// object's id.

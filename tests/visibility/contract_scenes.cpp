@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "core/assert.h"
 #include "core/path.h"
 #include "scenes/generate_city.h"
 #include "scenes/load.h"
@@ -266,6 +267,19 @@ Scene random_town(unsigned seed, bool floating) {
     builder.add_box(at - half, at + half, OccluderTag::kNever);
   }
   return std::move(builder).finish();
+}
+
+Scene moved(const Scene& scene, const Mat4& motion) {
+  Scene out;
+  out.meshes = scene.meshes;
+  out.node_names = scene.node_names;
+  for (Object o : scene.objects) {
+    o.to_world = motion * o.to_world;
+    out.objects.push_back(o);
+  }
+  const auto finished = finish_scene(out);
+  IVIS_ASSERT(finished, "a moved scene is sound");
+  return out;
 }
 
 }  // namespace ivis::test

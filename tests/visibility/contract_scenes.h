@@ -26,4 +26,7 @@ ContractScene small_city();
 /// between them.
 Scene random_town(unsigned seed, bool floating);
 
+/// The scene after a rotation or other motion of everything in it.
+Scene moved(const Scene& scene, const Mat4& motion);
+
 }  // namespace ivis::test

@@ -67,19 +67,10 @@ TEST(OcclusionMap, AFloatingSlabHidesWhatIsAboveItAndNotWhatIsSeenUnderIt) {
 
 /// Blocks and boxes turned about a slanted axis: nothing in it is upright.
 Scene tilted_town(std::vector<Vec3>& eyes) {
-  const Scene town = test::random_town(5, false);
-  Scene out;
-  out.meshes = town.meshes;
-  out.node_names = town.node_names;
   const Mat4 turn = glm::rotate(Mat4{1}, 0.7, glm::normalize(Vec3{1, 2, 3}));
-  for (Object o : town.objects) {
-    o.to_world = turn * o.to_world;
-    out.objects.push_back(o);
-  }
-  EXPECT_TRUE(finish_scene(out));
   for (const Vec3& eye : {Vec3{0, 1.7, 0}, Vec3{30, 2, -20}})
     eyes.push_back(Vec3(turn * glm::dvec4(eye, 1)));
-  return out;
+  return test::moved(test::random_town(5, false), turn);
 }
 
 TEST(OcclusionMap, HidesInATownThatIsTurnedInSpaceWhereNothingIsAPrism) {

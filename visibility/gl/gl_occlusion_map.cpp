@@ -102,9 +102,9 @@ GlOcclusionMap::GlOcclusionMap(std::unique_ptr<GlContext> context, const Scene& 
       occluders_(occluders),
       options_(options),
       guards_(guards),
-      origin_(scene.bounds.empty() ? Vec3{0} : scene.bounds.centre()),
+      frame_(choose_frame(scene, occluders.slack_m)),
       near_m_(near_for(occluders.reach)),
-      pieces_(make_pieces(scene, occluders, origin_)),
+      pieces_(make_pieces(scene, occluders, frame_)),
       solids_(occluders),
       context_(std::move(context)) {
   options_.map_pixels = pixels_for(options.map_pixels, occluders.reach);
@@ -150,7 +150,7 @@ Status GlOcclusionMap::prepare() {
   }
   pieces_.batches = {};  // the context has them
   std::vector<float> boxes;
-  const SubBoxes sub_boxes(scene_, origin_);
+  const SubBoxes sub_boxes(scene_, frame_);
   for (ObjectId id = 0; id < scene_.objects.size(); ++id) {
     const Object& o = scene_.objects[id];
     if (o.always_visible) {
@@ -169,7 +169,8 @@ Status GlOcclusionMap::prepare() {
         add({parts.lo_x[c], parts.lo_y[c], parts.lo_z[c]},
             {parts.hi_x[c], parts.hi_y[c], parts.hi_z[c]});
     } else {
-      add(o.bounds.lo - origin_, o.bounds.hi - origin_);
+      const Aabb box = bounds_in(frame_, scene_, o);
+      add(box.lo, box.hi);
     }
   }
 
@@ -278,11 +279,11 @@ Result<Pvs> GlOcclusionMap::solve(const ViewCell& cell) const {
 Result<Pvs> GlOcclusionMap::solve(const ViewCell& cell, Stats& stats) const {
   if (auto s = check_cell(cell, occluders_); !s) return s.error();
   Pvs pvs = empty_answer(scene_, cell);
-  if (auto why = why_everything(cell.eye, origin_, solids_, occluders_.slack_m); !why.empty()) {
+  const MapCell c = make_map_cell(cell, frame_, occluders_);
+  if (auto why = why_everything(cell.eye, c.eye, solids_, occluders_.slack_m); !why.empty()) {
     list_everything(scene_, std::move(why), pvs);
     return pvs;
   }
-  const MapCell c = make_map_cell(cell, origin_, occluders_);
   const std::lock_guard lock(mutex_);
   const auto current = context_->make_current();
   if (!current) return current.error();

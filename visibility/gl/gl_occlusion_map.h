@@ -92,7 +92,7 @@ class GlOcclusionMap : public Method {
   const OccluderSet& occluders_;
   MethodOptions options_;
   OcclusionGuards guards_;
-  Vec3 origin_;
+  MapFrame frame_;
   float near_m_;
   std::vector<ObjectId> always_visible_;
   std::vector<ObjectId> ids_;  ///< of the boxes; some objects have several
