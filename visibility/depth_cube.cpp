@@ -736,14 +736,14 @@ void find_visible_children(const BoxTree& tree, std::uint32_t root, const float 
 
 std::vector<const char*> depth_targets() {
   std::vector<const char*> names;
-  for (std::int64_t all = hwy::SupportedTargets(); all != 0; all &= all - 1)
+  for (std::int64_t all = hwy::SupportedTargets() & HWY_TARGETS; all != 0; all &= all - 1)
     names.push_back(hwy::TargetName(all & -all));
   return names;
 }
 
 bool use_depth_target(const std::string& name) {
   hwy::SetSupportedTargetsForTest(0);
-  for (std::int64_t all = hwy::SupportedTargets(); all != 0; all &= all - 1)
+  for (std::int64_t all = hwy::SupportedTargets() & HWY_TARGETS; all != 0; all &= all - 1)
     if (name == hwy::TargetName(all & -all)) {
       hwy::SetSupportedTargetsForTest(all & -all);
       hwy::GetChosenTarget().Update(hwy::SupportedTargets());

@@ -10,10 +10,11 @@
 namespace ivis {
 namespace {
 
-constexpr double kWorthwhile = 0.8;           ///< of the boxes' surfaces
-constexpr std::size_t kMostSamples = 200000;  ///< triangles looked at
-constexpr double kCellsAUnit = 32;            ///< of the grid that directions are counted in
-constexpr double kSquare = 0.02;              ///< cosine of directions that count as perpendicular
+constexpr double kWorthwhile = 0.8;             ///< of the boxes' surfaces
+constexpr std::size_t kMostSamples = 200000;    ///< triangles looked at
+constexpr std::size_t kMostVertices = 4000000;  ///< whose turned boxes are compared
+constexpr double kCellsAUnit = 32;              ///< of the grid that directions are counted in
+constexpr double kSquare = 0.02;  ///< cosine of directions that count as perpendicular
 
 double surface(const Aabb& b) {
   const Vec3 s = b.size();
@@ -113,9 +114,15 @@ MapFrame choose_frame(const Scene& scene, double slack_m) {
   // `a` is up where the scene is a turned city, so that it becomes the maps' second axis.
   const Vec3 x = glm::normalize(*b - *a * glm::dot(*a, *b));
   turned.turn = glm::transpose(glm::dmat3(x, *a, glm::cross(x, *a)));
+  // Instances of large meshes may have far more vertices than the file: every few objects then.
+  std::size_t vertices = 0;
+  for (const Object& o : scene.objects)
+    vertices += scene.mesh_of(o).positions.size();
+  const std::size_t step = vertices / kMostVertices + 1;
   double before = 0;
   double after = 0;
-  for (const Object& o : scene.objects) {
+  for (std::size_t i = 0; i < scene.objects.size(); i += step) {
+    const Object& o = scene.objects[i];
     if (o.always_visible) continue;
     before += surface(o.bounds);
     after += surface(bounds_in(turned, scene, o));

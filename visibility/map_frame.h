@@ -20,7 +20,7 @@ struct MapFrame {
 /// About the middle of the scene's bounds; turned to the two commonest directions of its faces if
 /// the surfaces of all objects' boxes together become a fifth smaller by that, and if single
 /// precision of the turned coordinates is within `slack_m` as it is within the scene's own.
-/// Cost: O(vertices). The same for the same scene.
+/// Cost: O(objects), and O(vertices) where it turns. The same for the same scene.
 MapFrame choose_frame(const Scene& scene, double slack_m);
 
 /// In map coordinates: a box that holds all of the object's vertices.
