@@ -160,9 +160,8 @@ std::string picture(const Scene& scene, const Shrunk& shrunk) {
        << kPixels + 24 << "\">" << scene.objects.size() << " objects from above, "
        << static_cast<long>(size.x) << " x " << static_cast<long>(size.z) << " m, shrunk by "
        << shrunk.set.reach.to_string() << "</text>\n<text x=\"12\" y=\"" << kPixels + 48
-       << "\">tan: solids; dark: what is left of them; blue: convex, no prism; red: thinner than "
-          "the reach; orange: left out (without what is "
-          "marked never)</text></g>\n</svg>\n";
+       << "\">tan: solids; dark: what is left; blue: convex, no prism; red: thinner than "
+          "the reach; orange: boxes of what was left out (save 'never')</text></g>\n</svg>\n";
   p.raw(tail.str());
   return p.text();
 }
