@@ -20,7 +20,7 @@ function(ivis_target target)
   if(IVIS_SANITIZE)
     target_compile_options(${target} PRIVATE -fsanitize=${IVIS_SANITIZE} -fno-omit-frame-pointer
       -fno-sanitize-recover=all -O1
-      -g1 -fno-var-tracking -fno-var-tracking-assignments)  # lines in reports; full -g takes gcc twice as long
+      -g1 $<$<CXX_COMPILER_ID:GNU>:-fno-var-tracking> $<$<CXX_COMPILER_ID:GNU>:-fno-var-tracking-assignments>)  # lines in reports; full -g takes gcc twice as long
     target_link_options(${target} PUBLIC -fsanitize=${IVIS_SANITIZE})
   endif()
 endfunction()

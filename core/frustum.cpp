@@ -6,6 +6,8 @@
 #include <numbers>
 #include <string>
 
+#include "core/assert.h"
+
 namespace ivis {
 namespace {
 
@@ -91,13 +93,18 @@ bool Frustum::can_look_along(const Vec3& direction) const {
 // where that is no angle below 90 degrees, the side keeps nothing out. Of the eyes in the cell the
 // side n must hold all: n·(p - e) <= 0 for some e = P + v with v in V is n·(p - P) <= max n·v =
 // support(n).
-FrustumSweep::FrustumSweep(const Frustum& f, const ViewCell& cell) {
+FrustumSweep::FrustumSweep(const Frustum& f, const ViewCell& cell, double slack_m) {
+  IVIS_ASSERT(std::isfinite(f.yaw_deg) && std::abs(f.pitch_deg) <= 90 && f.fov_x_deg > 0 &&
+                  f.fov_x_deg < 180 && f.fov_y_deg > 0 && f.fov_y_deg < 180 && f.turn_deg >= 0 &&
+                  f.turn_deg <= 180,
+              "a frustum as Frustum::parse() gives");
   if (f.turn_deg >= 90) return;
-  const auto [right, up, forward] = axes(f);
+  const std::array<Vec3, 3> axis = axes(f);
+  const Vec3& forward = axis[2];
   const double a = f.fov_x_deg / 2 * kDegree;
   const double b = f.fov_y_deg / 2 * kDegree;
   const double corner = std::sqrt(1 + std::tan(a) * std::tan(a) + std::tan(b) * std::tan(b));
-  const Reach reach = padded(cell.reach, 0);
+  const Reach reach = padded(cell.reach, slack_m);
   const auto add = [&](double half, const Vec3& side) {
     const double sine = std::sin(f.turn_deg * kDegree) * std::cos(half) * corner;
     if (!(sine < 1)) return;
@@ -108,8 +115,8 @@ FrustumSweep::FrustumSweep(const Frustum& f, const ViewCell& cell) {
       sides_.push_back({n, glm::dot(n, cell.eye) + reach.support(n)});
     }
   };
-  add(a, right);
-  add(b, up);
+  add(a, axis[0]);
+  add(b, axis[1]);
 }
 
 bool FrustumSweep::may_meet(const Aabb& box) const {
@@ -117,7 +124,7 @@ bool FrustumSweep::may_meet(const Aabb& box) const {
     const Vec3 near = glm::mix(box.lo, box.hi, glm::lessThan(s.outward, Vec3(0)));
     const double magnitude =
         std::abs(near.x) + std::abs(near.y) + std::abs(near.z) + std::abs(s.offset);
-    return glm::dot(s.outward, near) <= s.offset + 1e-12 * magnitude;
+    return !(glm::dot(s.outward, near) > s.offset + 1e-12 * magnitude);
   });
 }
 

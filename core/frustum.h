@@ -39,7 +39,9 @@ struct Frustum {
 /// Threads:   const and reentrant. Cost: four dot products a box.
 class FrustumSweep {
  public:
-  FrustumSweep(const Frustum& frustum, const ViewCell& cell);
+  /// `slack_m`: error of positions that is served besides, as OccluderSet::slack_m. Asserts what
+  /// Frustum::parse() checks.
+  FrustumSweep(const Frustum& frustum, const ViewCell& cell, double slack_m = 0.001);
   /// Does the box meet it? Errs towards yes.
   bool may_meet(const Aabb& box) const;
 

@@ -18,7 +18,8 @@ ViewCell cover(std::span<const Vec3> eyes, const Reach& reach) {
     vertical = std::max(vertical, std::abs(e.y - centre.y));
   }
   if (horizontal == 0 && vertical == 0) return {centre, reach};
-  return {centre, reach.grown(horizontal, vertical)};
+  // What is grown is no disc any more, so a disc's larger vertical tolerance becomes reach.
+  return {centre, reach.grown(horizontal, vertical + vertical_tolerance(reach) - kReachToleranceM)};
 }
 
 }  // namespace ivis

@@ -66,8 +66,11 @@ std::optional<Ring> inset_ring(const Ring& ring, double distance) {
     Ring moved(count);  // moved[i]: between lines i - 1 and i
     for (std::size_t i = 0; i < count; ++i) {
       const auto p = corner(lines[(i + count - 1) % count], lines[i], distance);
-      // Of a convex outline two sides that face each other are left, too near: nothing in between.
-      if (!p) return convex && count < ring.size() ? std::optional<Ring>(Ring{}) : std::nullopt;
+      if (!p) {
+        // Of a convex outline two sides that face each other are left, too near: nothing between.
+        const bool facing = glm::dot(lines[(i + count - 1) % count].d, lines[i].d) < 0;
+        return convex && facing && count < ring.size() ? std::optional<Ring>(Ring{}) : std::nullopt;
+      }
       moved[i] = *p;
     }
     // The edge that turned round by most goes, and its neighbours meet.

@@ -218,7 +218,8 @@ void SolveArgs::add_to(CLI::App& app, bool reach_required) {
           },
           "PIXELS");
   app.add_option("--frustum", frustum,
-                 "list only what can be in the picture: yaw,pitch,fov_x,fov_y,turn in degrees; yaw "
+                 "list only what can be in the picture, along a path with the same direction at "
+                 "every pose: yaw,pitch,fov_x,fov_y,turn in degrees; yaw "
                  "0 looks along +X, 90 along -Z; full "
                  "angles of view; turn: how far the view may turn while an answer is in use")
       ->type_name("YAW,PITCH,FOV_X,FOV_Y,TURN");
@@ -330,7 +331,8 @@ Result<std::unique_ptr<Prepared>> prepare(const SceneArgs& scene, const SolveArg
   if (!method) return method.error();
   prepared->method = std::move(*method);
   if (*frustum)
-    prepared->method = cull_by_frustum(std::move(prepared->method), prepared->scene, **frustum);
+    prepared->method = cull_by_frustum(std::move(prepared->method), prepared->scene, **frustum,
+                                       prepared->occluders.slack_m);
   return prepared;
 }
 

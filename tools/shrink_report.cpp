@@ -158,7 +158,7 @@ std::string picture(const Scene& scene, const Shrunk& shrunk) {
   std::ostringstream tail;
   tail << "<g font-family=\"sans-serif\" font-size=\"17\" fill=\"#222\"><text x=\"12\" y=\""
        << kPixels + 24 << "\">" << scene.objects.size() << " objects from above, "
-       << static_cast<long>(size.x) << " x " << static_cast<long>(size.z) << " m, shrunk by "
+       << std::round(size.x) << " x " << std::round(size.z) << " m, shrunk by "
        << shrunk.set.reach.to_string() << "</text>\n<text x=\"12\" y=\"" << kPixels + 48
        << "\">tan: solids; dark: what is left; blue: convex, no prism; red: thinner than "
           "the reach; orange: boxes of what was left out (save 'never')</text></g>\n</svg>\n";

@@ -7,8 +7,9 @@ namespace {
 
 class FrustumCull final : public Method {
  public:
-  FrustumCull(std::unique_ptr<Method> method, const Scene& scene, const Frustum& frustum)
-      : method_(std::move(method)), scene_(scene), frustum_(frustum) {}
+  FrustumCull(std::unique_ptr<Method> method, const Scene& scene, const Frustum& frustum,
+              double slack_m)
+      : method_(std::move(method)), scene_(scene), frustum_(frustum), slack_m_(slack_m) {}
 
   const MethodTraits& traits() const override { return method_->traits(); }
   Backend backend() const override { return method_->backend(); }
@@ -16,7 +17,7 @@ class FrustumCull final : public Method {
   Result<Pvs> solve(const ViewCell& cell) const override {
     auto pvs = method_->solve(cell);
     if (!pvs || !pvs->everything_because.empty()) return pvs;
-    const FrustumSweep sweep(frustum_, cell);
+    const FrustumSweep sweep(frustum_, cell, slack_m_);
     std::erase_if(pvs->objects, [&](ObjectId id) {
       const Object& o = scene_.objects[id];
       return !o.always_visible && !sweep.may_meet(o.bounds);
@@ -28,13 +29,14 @@ class FrustumCull final : public Method {
   std::unique_ptr<Method> method_;
   const Scene& scene_;
   Frustum frustum_;
+  double slack_m_;
 };
 
 }  // namespace
 
 std::unique_ptr<Method> cull_by_frustum(std::unique_ptr<Method> method, const Scene& scene,
-                                        const Frustum& frustum) {
-  return std::make_unique<FrustumCull>(std::move(method), scene, frustum);
+                                        const Frustum& frustum, double slack_m) {
+  return std::make_unique<FrustumCull>(std::move(method), scene, frustum, slack_m);
 }
 
 }  // namespace ivis

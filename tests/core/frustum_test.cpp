@@ -187,11 +187,16 @@ TEST(Cover, HoldsEveryMoveOfEveryEye) {
     std::vector<Vec3> eyes;
     for (int k = 0; k <= i % 3; ++k)
       eyes.emplace_back(draw.of(-1, 1), draw.of(-0.1, 0.1), draw.of(-1, 1));
-    const Reach reach = i % 2 == 0 ? Reach::cylinder(0.5, 0.1) : Reach::ellipsoid({0.5, 0.2, 0.7});
+    const Reach reach = i % 3 == 0   ? Reach::cylinder(0.5, 0.1)
+                        : i % 3 == 1 ? Reach::disc(0.5)
+                                     : Reach::ellipsoid({0.5, 0.2, 0.7});
     const ViewCell cell = cover(eyes, reach);
     for (const Vec3& eye : eyes)
-      for (const Vec3& v : reach.extreme_points(24))
+      for (const Vec3& v : reach.extreme_points(24)) {
         ASSERT_TRUE(cell.contains(eye + v));
+        // What one eye's own cell would accept beside its reach.
+        ASSERT_TRUE(cell.contains(eye + v + Vec3{0, 0.9 * vertical_tolerance(reach), 0}));
+      }
   }
 }
 

@@ -79,6 +79,14 @@ TEST(Inset, SaysThatNothingIsLeftOfAThinConvexOutline) {
   EXPECT_TRUE(inset({}, 1)->empty());
 }
 
+TEST(Inset, OfAThickOutlineWithANearlyStraightCornerIsNotSaidToBeNothing) {
+  const Polygon p{{{{0, 0.003}, {10, 0}, {10.0001, 0}, {20, 0.003}, {20, 10}, {0, 10}}}};
+  for (const double distance : {0.25, 0.5, 1.0, 2.0, 4.0}) {
+    const auto in = inset(p, distance);
+    EXPECT_TRUE(!in || !in->empty()) << distance;
+  }
+}
+
 TEST(Inset, LeavesALongMitreToTheEroder) {
   // A notch like a needle, whose tip is a reflex corner of nearly 360 degrees.
   const Polygon notched{{{{0, 0}, {9.9, 0}, {10, 10}, {10.1, 0}, {20, 0}, {20, 20}, {0, 20}}}};

@@ -81,7 +81,16 @@ TEST(ToolShrink, ReportsWhatBecameOfEveryObject) {
 
 TEST(ToolShrink, WritesAFileAndPrintsTheFixedKeys) {
   const SmallTown town;
-  for (const std::string builder : {"fast", "exact"}) {
+#ifdef IVIS_HAVE_CGAL
+  const std::vector<std::string> builders{"fast", "exact"};
+#else
+  const std::vector<std::string> builders{"fast"};
+  const Ran refused = ivis({"shrink", town.scene, "--reach", "disc:1", "-o", town.folder / "x.ivo",
+                            "--builder", "exact"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.errors.find("IVIS_WITH_CGAL"), std::string::npos) << refused.errors;
+#endif
+  for (const std::string& builder : builders) {
     const std::string file = town.folder / (builder + ".ivo");
     const Ran ran = ivis({"shrink", town.scene, "--reach", "cylinder:1.5,0.1", "-o", file,
                           "--builder", builder, "--json"});
