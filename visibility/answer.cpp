@@ -26,9 +26,10 @@ Pvs empty_answer(const Scene& scene, const ViewCell& cell) {
 std::string why_everything(const Vec3& eye, const Vec3& map_eye, const SolidIndex& solids,
                            double slack_m) {
   if (solids.holds(eye)) return "eye inside an occluder";
-  for (int i = 0; i < 3; ++i)
-    if (std::abs(map_eye[i] - static_cast<double>(static_cast<float>(map_eye[i]))) > 0.5 * slack_m)
-      return "eye too far from the scene for single precision";
+  // As a length, since a map's axes may be turned: the slack is an upright cylinder.
+  const Vec3 error = map_eye - Vec3(glm::vec3(map_eye));
+  if (!(glm::length(error) <= 0.7 * slack_m))
+    return "eye too far from the scene for single precision";
   return {};
 }
 

@@ -114,15 +114,15 @@ MapFrame choose_frame(const Scene& scene, double slack_m) {
   // `a` is up where the scene is a turned city, so that it becomes the maps' second axis.
   const Vec3 x = glm::normalize(*b - *a * glm::dot(*a, *b));
   turned.turn = glm::transpose(glm::dmat3(x, *a, glm::cross(x, *a)));
-  // Instances of large meshes may have far more vertices than the file: every few objects then.
+  // Instances of large meshes may have far more vertices than the file: no turning then.
   std::size_t vertices = 0;
-  for (const Object& o : scene.objects)
-    vertices += scene.mesh_of(o).positions.size();
-  const std::size_t step = vertices / kMostVertices + 1;
+  for (const auto* list : {&scene.objects, &scene.hidden_solids, &scene.wholes})
+    for (const Object& o : *list)
+      vertices += scene.mesh_of(o).positions.size();
+  if (vertices > kMostVertices) return plain;
   double before = 0;
   double after = 0;
-  for (std::size_t i = 0; i < scene.objects.size(); i += step) {
-    const Object& o = scene.objects[i];
+  for (const Object& o : scene.objects) {
     if (o.always_visible) continue;
     before += surface(o.bounds);
     after += surface(bounds_in(turned, scene, o));
@@ -132,7 +132,9 @@ MapFrame choose_frame(const Scene& scene, double slack_m) {
   // worse.
   const Aabb all = bounds_in(turned, scene);
   const Vec3 far = glm::max(glm::abs(all.lo), glm::abs(all.hi));
-  const auto extent = static_cast<float>(std::max({far.x, far.y, far.z}));
+  // Prisms drawn down to the floor may reach as far as the corners of the world's box, and a metre.
+  const double drawn = glm::length(scene.bounds.size()) / 2 + 1;
+  const auto extent = static_cast<float>(std::max({far.x, far.y, far.z, drawn}));
   const float next = std::nextafter(extent, std::numeric_limits<float>::infinity());
   if (!(4 * (static_cast<double>(next) - static_cast<double>(extent)) <= slack_m)) return plain;
   return turned;
