@@ -97,14 +97,7 @@ TEST(OcclusionMap, APlaneBeyondWhichNothingLiesLosesNothingToTheReach) {
     const ObjectId low = b.add_box({30, 0.2, 0}, {30.2, 0.4, 0.2}, OccluderTag::kNever);
     if (something_below) b.add_box({30, -1, 5}, {31, -0.5, 6}, OccluderTag::kNever);
     const Scene upright = std::move(b).finish();
-    Scene scene;
-    scene.meshes = upright.meshes;
-    scene.node_names = upright.node_names;
-    for (Object o : upright.objects) {
-      o.to_world = turn * o.to_world;
-      scene.objects.push_back(o);
-    }
-    ASSERT_TRUE(finish_scene(scene));
+    const Scene scene = test::moved(upright, turn);
     const Reach reach = Reach::ball(0.3);
     const OccluderSet set = shrunk(scene, reach);
     const Pvs pvs = solved(scene, set, {Vec3(turn * glm::dvec4(0, 0.5, 0, 1)), reach});
