@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "core/view_cell.h"
+#include "occluders/backing.h"
 #include "occluders/convex.h"
 #include "occluders/progress.h"
 #include "occluders/sheets.h"
@@ -107,6 +108,9 @@ Status add_convex_and_sheets(const Scene& scene, const std::vector<const Object*
   report.convex_solids += odd.size();
   report.convex_pieces += set.solid_pieces.size();
   std::move(odd.begin(), odd.end(), std::back_inserter(set.convex_solids));
+  if (context.stopped()) return cancelled();
+
+  set.backings = find_backings(scene, pieces, context);
   if (context.stopped()) return cancelled();
 
   if (!options.margins || options.sheets == SheetUse::kOff ||

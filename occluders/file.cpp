@@ -14,7 +14,7 @@ namespace {
 
 // The layout is documented in FORMAT.md.
 constexpr std::string_view kMagic = "ivis.ivo";
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 3;
 constexpr std::size_t kHeaderBytes = 32;
 constexpr std::size_t kChecksumAt = 24;
 constexpr std::size_t kMaxFileBytes = std::size_t{4} << 30U;
@@ -119,6 +119,7 @@ class Reader {
     if (v > max) fail(field, std::to_string(v), "at most " + std::to_string(max));
     return failed() ? std::uint8_t{0} : v;
   }
+  std::uint32_t u32(const char* field) { return static_cast<std::uint32_t>(integer(4, field)); }
   std::uint64_t u64(const char* field) { return integer(8, field); }
   double f64(const char* field) {
     const double v = std::bit_cast<double>(integer(8, field));
@@ -362,6 +363,12 @@ std::string encode_occluders(const OccluderSet& set) {
     for (const FaceMesh& level : sheet.levels)
       out.mesh(level);
   }
+  out.u64(set.backings.size());
+  for (const Backing& b : set.backings) {
+    out.u32(b.object);
+    out.vec(b.plane.normal);
+    out.f64(b.plane.offset);
+  }
   out.height_field(set.height_field);
   out.u64(set.convex_solids.size());
   for (const ConvexSolid& solid : set.convex_solids) {
@@ -448,6 +455,13 @@ Result<OccluderSet> decode_occluders(std::span<const std::byte> bytes, const std
     sheet.normal = in.normal("normal of a sheet");
     sheet.offset = in.f64("offset of a sheet");
     sheet.levels = in.meshes(set.sheet_radii_m.size());
+    if (in.failed()) break;
+  }
+  set.backings.resize(in.count("backings", 8, 0, 4 + kPointBytes + 8));
+  for (Backing& b : set.backings) {
+    b.object = in.u32("object of a backing");
+    b.plane.normal = in.normal("normal of a backing");
+    b.plane.offset = in.f64("offset of a backing");
     if (in.failed()) break;
   }
   set.height_field = in.height_field();

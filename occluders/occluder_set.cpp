@@ -120,6 +120,16 @@ Status check_numbers(const OccluderSet& set) {
         sheet.levels.size() > set.sheet_radii_m.size() ||
         std::any_of(sheet.levels.begin(), sheet.levels.end(), bad_mesh))
       return invalid_argument("occluders: a sheet has a number out of range");
+  for (std::size_t i = 0; i < set.backings.size(); ++i) {
+    const Backing& b = set.backings[i];
+    if (outside(b.plane.normal) || !in_range(b.plane.offset))
+      return invalid_argument("occluders: a backing has a number out of range");
+    if (i > 0 && b.object < set.backings[i - 1].object)
+      return invalid_argument("occluders: backing " + std::to_string(i) + ": object " +
+                              std::to_string(b.object) + " after object " +
+                              std::to_string(set.backings[i - 1].object) +
+                              ", expected ascending ones");
+  }
   return ok();
 }
 

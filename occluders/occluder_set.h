@@ -95,6 +95,14 @@ struct HeightField {
   bool empty() const { return heights.empty(); }
 };
 
+/// A plane in which triangles of an object lie flush against matter, which fills the side
+/// normal.x < offset. An object is hidden from a cell that lies wholly on that side of all its
+/// planes (occluders/backing.h).
+struct Backing {
+  ObjectId object = 0;
+  ConvexSolid::Plane plane;
+};
+
 /// Where observers may be. Kept for the record: what counted as solid depends on it.
 struct ViewSpace {
   enum class Kind : std::uint8_t { kOutside, kInside };
@@ -135,6 +143,8 @@ struct OccluderSet {
   std::vector<SolidPiece> solid_pieces;
   std::vector<double> sheet_radii_m;  ///< ascending
   std::vector<Sheet> sheets;
+  /// By ascending objects: all planes of each object that has any.
+  std::vector<Backing> backings;
   /// For the cull map: terrain, shrunk as `shrunk` is.
   HeightField height_field;
   // Unshrunk, like `solids`: an eye in one of these is inside matter, or where no observer gets to.

@@ -9,114 +9,18 @@
 #include "occluders/clip.h"
 #include "occluders/distance_check.h"
 #include "occluders/fast_erosion.h"
+#include "occluders/plane_sections.h"
 #include "occluders/progress.h"
 #include "occluders/quads.h"
-#include "occluders/rect_tree.h"
 #include "occluders/simplify.h"
 
 namespace ivis {
 namespace {
 
-constexpr double kInsideM = 0.001;   ///< how far below its faces a sheet cuts the solids
-constexpr double kMostSeamM = 1e-4;  ///< seams are closed by this at most, from either side
-constexpr double kMaxTiles = 4096;   ///< of one part of a plane, before they are divided
+constexpr double kInsideM = 0.001;  ///< how far below its faces a sheet cuts the solids
+constexpr double kMaxTiles = 4096;  ///< of one part of a plane, before they are divided
 constexpr double kMinExposedM2 = 0.01;
 constexpr int kTangents = 16;  ///< of a shrunk sheet's round corners, a whole turn
-
-/// A plane's own coordinates: u x v = n.
-struct PlaneFrame {
-  Vec3 origin, u, v, n;
-  Vec3 to_world(const Vec2& p) const { return origin + u * p.x + v * p.y; }
-  Vec2 to_plane(const Vec3& p) const { return {glm::dot(p - origin, u), glm::dot(p - origin, v)}; }
-};
-
-PlaneFrame frame_at(const Vec3& n, const Vec3& origin) {
-  // Along an axis of the world where it can be: then walls that follow the axes lie on the grid.
-  int axis = 0;
-  for (int i = 1; i < 3; ++i)
-    if (std::abs(n[i]) < std::abs(n[axis])) axis = i;
-  Vec3 u{0};
-  u[axis] = 1;
-  u = glm::normalize(u - n * glm::dot(u, n));
-  return {origin, u, glm::cross(n, u), n};
-}
-
-/// The half-plane normal.p <= offset; false when it cuts everything away.
-bool cut(Ring& ring, const Vec2& normal, double offset) {
-  Ring out;
-  out.reserve(ring.size() + 1);
-  for (std::size_t i = 0; i < ring.size(); ++i) {
-    const Vec2& a = ring[i];
-    const Vec2& b = ring[(i + 1) % ring.size()];
-    const double da = glm::dot(normal, a) - offset;
-    const double db = glm::dot(normal, b) - offset;
-    if (da <= 0) out.push_back(a);
-    if ((da < 0 && db > 0) || (da > 0 && db < 0)) out.push_back(a + (b - a) * (da / (da - db)));
-  }
-  ring = std::move(out);
-  return ring.size() >= 3;
-}
-
-Ring rectangle(const Box2& box) {
-  return {box.lo, {box.hi.x, box.lo.y}, box.hi, {box.lo.x, box.hi.y}};
-}
-
-/// Where the solid, grown by `seam` within the plane, meets the plane, inside `box`; empty if
-/// nowhere. Corners are cut off at `seam` too, so that sharp ones do not reach out farther.
-Ring section(const ConvexSolid& solid, const PlaneFrame& frame, const Box2& box, double seam) {
-  struct HalfPlane {
-    Vec2 normal;
-    double offset;
-  };
-  std::vector<HalfPlane> halves;
-  halves.reserve(solid.planes.size());
-  const double span = glm::length(glm::max(glm::abs(box.lo), glm::abs(box.hi)));
-  for (const ConvexSolid::Plane& p : solid.planes) {
-    const Vec2 across{glm::dot(p.normal, frame.u), glm::dot(p.normal, frame.v)};
-    const double offset = p.offset - glm::dot(p.normal, frame.origin);
-    const double length = glm::length(across);
-    // All but parallel: dividing would lose the digits. It cuts nothing off within the box, or the
-    // section is given up.
-    if (length < 1e-7) {
-      if (offset < length * span) return {};
-      continue;
-    }
-    halves.push_back({across / length, offset / length});
-  }
-  Ring ring = rectangle(box);
-  for (const HalfPlane& h : halves)
-    if (!cut(ring, h.normal, h.offset)) return {};
-  if (seam <= 0) return ring;
-  const Ring bare = ring;
-  ring = rectangle(box);
-  for (const HalfPlane& h : halves)
-    if (!cut(ring, h.normal, h.offset + seam)) return {};
-  for (std::size_t i = 0; i < bare.size(); ++i) {
-    const Vec2& p = bare[i];
-    const Vec2 a = p - bare[(i + bare.size() - 1) % bare.size()];
-    const Vec2 b = bare[(i + 1) % bare.size()] - p;
-    const double la = glm::length(a);
-    const double lb = glm::length(b);
-    if (!(la > 0 && lb > 0)) continue;
-    const Vec2 out = a / la - b / lb;
-    const double l = glm::length(out);
-    if (l > 1e-6 && !cut(ring, out / l, glm::dot(out / l, p) + seam)) return {};
-  }
-  return ring;
-}
-
-Box2 box_of(const std::vector<Vec2>& ring) {
-  Box2 box;
-  for (const Vec2& p : ring)
-    box.add(p);
-  return box;
-}
-
-Box2 grown(Box2 box, double by) {
-  box.lo -= Vec2{by};
-  box.hi += Vec2{by};
-  return box;
-}
 
 /// Faces of solids that lie in one plane and look the same way.
 struct FaceRef {
@@ -200,17 +104,7 @@ struct Built {
 class SheetBuilder {
  public:
   SheetBuilder(const std::vector<ConvexPiece>& solids, const SheetOptions& options)
-      : solids_(solids), options_(options), eroder_(kTangents) {
-    std::vector<Box2> boxes;
-    for (const ConvexPiece& s : solids) {
-      const Vec3 far = glm::max(glm::abs(s.solid.bounds.lo), glm::abs(s.solid.bounds.hi));
-      const auto f = static_cast<float>(std::max({far.x, far.y, far.z}));
-      const float step = std::nextafter(f, std::numeric_limits<float>::infinity()) - f;
-      boxes.push_back({ground(s.solid.bounds.lo), ground(s.solid.bounds.hi)});
-      seams_.push_back(s.only ? std::min(kMostSeamM, 4 * static_cast<double>(step)) : 0);
-    }
-    tree_ = RectTree(boxes);
-  }
+      : sections_(solids), options_(options), eroder_(kTangents) {}
 
   Built build(const PlaneGroup& group) const {
     Built out;
@@ -256,13 +150,13 @@ class SheetBuilder {
       // Faces that other solids stand against cannot be in view.
       std::vector<Ring> hidden;
       double no_seam = 0;
-      collect(cuts_at(before, place), before, roi, hidden, no_seam);
+      sections_.collect(sections_.cuts_at(before, place), before, roi, hidden, no_seam);
       std::vector<Polygon> exposed = subtract(shown, Fill::kNonZero, hidden);
       std::erase_if(exposed, [](const Polygon& p) { return area(p) < kMinExposedM2; });
       if (exposed.empty()) continue;
       std::vector<Ring> matter;
       double seam = 0;
-      collect(cuts_at(frame, place), frame, grown(roi, around), matter, seam);
+      sections_.collect(sections_.cuts_at(frame, place), frame, grown(roi, around), matter, seam);
       shrink_part(frame, unite(matter, Fill::kNonZero), seam, exposed, out);
     }
     out.report.planes = out.sheets.empty() ? 0 : 1;
@@ -271,45 +165,8 @@ class SheetBuilder {
   }
 
  private:
-  struct Cut {
-    std::size_t solid;
-    Box2 box;
-  };
   /// One tile to be, with what of each level lies in it.
   using Levels = std::vector<std::vector<Polygon>>;
-
-  /// Solids that the plane may meet near `place`.
-  std::vector<Cut> cuts_at(const PlaneFrame& frame, const Aabb& place) const {
-    std::vector<std::uint32_t> near;
-    tree_.all({ground(place.lo), ground(place.hi)}, [&](std::uint32_t s) {
-      near.push_back(s);
-      return true;
-    });
-    std::sort(near.begin(), near.end());
-    std::vector<Cut> cuts;
-    for (const std::uint32_t s : near) {
-      const Aabb& b = solids_[s].solid.bounds;
-      if (!b.overlaps(place)) continue;
-      const Vec3 half = b.size() * 0.5;
-      const Vec3 c = b.centre() - frame.origin;
-      if (std::abs(glm::dot(frame.n, c)) > glm::dot(glm::abs(frame.n), half)) continue;
-      const Vec2 m{glm::dot(frame.u, c), glm::dot(frame.v, c)};
-      const Vec2 h{glm::dot(glm::abs(frame.u), half), glm::dot(glm::abs(frame.v), half)};
-      cuts.push_back({s, {m - h, m + h}});
-    }
-    return cuts;
-  }
-
-  void collect(const std::vector<Cut>& cuts, const PlaneFrame& frame, const Box2& box,
-               std::vector<Ring>& rings, double& seam) const {
-    for (const Cut& c : cuts) {
-      if (!c.box.overlaps(box)) continue;
-      Ring ring = section(solids_[c.solid].solid, frame, box, seams_[c.solid]);
-      if (ring.size() < 3) continue;
-      rings.push_back(std::move(ring));
-      seam = std::max(seam, seams_[c.solid]);
-    }
-  }
 
   void shrink_part(const PlaneFrame& frame, const std::vector<Polygon>& matter, double seam,
                    const std::vector<Polygon>& exposed, Built& out) const {
@@ -456,11 +313,9 @@ class SheetBuilder {
     }
   }
 
-  const std::vector<ConvexPiece>& solids_;
+  PlaneSections sections_;
   const SheetOptions& options_;
   FastEroder eroder_;
-  std::vector<double> seams_;
-  RectTree tree_;
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "visibility/method.h"
 
 #include "visibility/backend.h"
+#include "visibility/backing_cull.h"
 #include "visibility/cull_map.h"
 #include "visibility/occlusion_map.h"
 #include "visibility/reference.h"
@@ -74,10 +75,17 @@ Result<std::unique_ptr<Method>> make_method(std::string_view name, const Scene& 
       if (e.traits.needs_occluders && occluders.scene_hash != scene.hash)
         return mismatch("the occluders belong to another scene than the one loaded");
       if (auto sound = check_numbers(occluders); !sound) return sound.error();
+      if (e.traits.needs_occluders && !occluders.backings.empty() &&
+          occluders.backings.back().object >= scene.objects.size())
+        return mismatch("the occluders speak of object " +
+                        std::to_string(occluders.backings.back().object) + ", the scene has " +
+                        std::to_string(scene.objects.size()));
       if (options.backend == Backend::kGl && !e.has_gl)
         return invalid_argument("method '" + e.traits.name +
                                 "' has no OpenGL backend; 'occlusion-map' has");
-      return e.make(scene, occluders, options);
+      auto made = e.make(scene, occluders, options);
+      if (!made || !e.traits.needs_occluders || occluders.backings.empty()) return made;
+      return cull_backed(std::move(*made), scene, occluders);
     }
     known += (known.empty() ? "" : ", ") + e.traits.name;
   }

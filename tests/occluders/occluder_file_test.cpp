@@ -39,6 +39,7 @@ OccluderSet example() {
                       {{tetrahedron}, {}, {}}};
   set.sheet_radii_m = {0.5};
   set.sheets = {{{0, 0.6, 0.8}, 3.5, {square}}};
+  set.backings = {{3, {{0, 1, 0}, 2.5}}, {3, {{0.6, 0, 0.8}, -1}}, {7, {{1, 0, 0}, 0}}};
   set.height_field = {{-1, 2}, {0.5, 0.25}, 2, 3, {1, 2, 3, 4.5F, HeightField::kNone, 6}};
   set.convex_solids = {
       {{{{1, 0, 0}, 1}, {{-1, 0, 0}, 0}, {{0, 1, 0}, 2}, {{0, 0, 1}, 3}}, {{0, 0, 0}, {1, 2, 3}}}};
@@ -221,6 +222,8 @@ TEST(OccluderFile, RefusesPiecesThatDoNotFitTogether) {
   refused("planes of a convex solid", [](OccluderSet& s) { s.convex_solids[0].planes.resize(3); });
   refused("box of a convex solid", [](OccluderSet& s) { s.convex_solids[0].bounds.lo.x = 2; });
   refused("closed box", [](OccluderSet& s) { s.closed_boxes[0].lo.y = 5; });
+  refused("normal of a backing", [](OccluderSet& s) { s.backings[1].plane.normal.x = 0.5; });
+  refused("backing 2: object 2 after object 3", [](OccluderSet& s) { s.backings[2].object = 2; });
   refused("step of the height field", [](OccluderSet& s) { s.height_field.step.y = 0; });
   refused("cells of the height field",
           [](OccluderSet& s) { s.height_field.columns = s.height_field.rows = ~0U; });
@@ -231,11 +234,11 @@ TEST(OccluderFile, RefusesPiecesThatDoNotFitTogether) {
 
 TEST(OccluderFile, RefusesAnotherVersionAsAMismatch) {
   std::string bytes = encode_occluders(example());
-  put(bytes, 8, 3, 4);
+  put(bytes, 8, 2, 4);
   const auto set = decode(with_right_checksum(bytes));
   ASSERT_FALSE(set);
   EXPECT_EQ(set.error().code, ErrorCode::kMismatch);
-  EXPECT_THAT(set.error().message, HasSubstr("version 3"));
+  EXPECT_THAT(set.error().message, HasSubstr("version 2"));
 }
 
 TEST(OccluderFile, OnlyServesItsOwnSceneAndReachesItContains) {

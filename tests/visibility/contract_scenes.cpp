@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 #include <unistd.h>
+#include <glm/gtc/matrix_transform.hpp>
 
 #include "core/assert.h"
 #include "core/path.h"
@@ -69,6 +70,29 @@ Mesh slope(double fall) {
     }
   m.primitives = {{0, static_cast<std::uint32_t>(m.triangles()), true, true}};
   return m;
+}
+
+/// A game map's crates: matter that is not drawn, and six drawn faces over it, each an object.
+void add_crate(SceneBuilder& b, const Vec3& lo, const Vec3& hi, const Mat4& turn) {
+  Mesh crate;
+  for (int i = 0; i < 8; ++i)
+    crate.positions.emplace_back((i & 1) != 0 ? hi.x : lo.x, (i & 2) != 0 ? hi.y : lo.y,
+                                 (i & 4) != 0 ? hi.z : lo.z);
+  for (glm::vec3& p : crate.positions)
+    p = glm::vec3(turn * glm::dvec4(Vec3(p), 1.0));
+  constexpr std::uint32_t kFaces[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                          {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+  for (const auto& f : kFaces) {
+    Mesh face;
+    for (const std::uint32_t corner : f)
+      face.positions.push_back(crate.positions[corner]);
+    face.indices = {0, 1, 2, 0, 2, 3};
+    face.primitives = {{0, 2, true, true}};
+    b.add_mesh(std::move(face), OccluderTag::kNever);
+    crate.indices.insert(crate.indices.end(), {f[0], f[1], f[2], f[0], f[2], f[3]});
+  }
+  crate.primitives = {{0, 12, true, true}};
+  b.add_mesh(std::move(crate), OccluderTag::kOnly);
 }
 
 double hills(double x, double z) {
@@ -207,6 +231,16 @@ std::vector<ContractScene> analytic_scenes() {
     add_clutter(b);
     all.push_back(
         finished("gabled houses", std::move(b), {street, {-27, 1.7, 0}, {0, 9, 0}}, {-20, 3, 14}));
+  }
+  {
+    SceneBuilder b;
+    for (int i = 0; i < 40; ++i) {
+      const Vec3 lo{-50 + i * 37 % 100, i % 3 * 0.5, -50 + i * 53 % 100};
+      const Mat4 turn = i % 4 == 3 ? glm::rotate(Mat4{1}, 0.3 * i, Vec3{0, 1, 0}) : Mat4{1};
+      add_crate(b, lo, lo + Vec3{2 + i % 5, 2 + i % 2, 3}, turn);
+    }
+    all.push_back(finished("crates with drawn faces", std::move(b),
+                           {{0.5, 1.7, 0.5}, {0.5, 12, 40}, {-60, 0.2, 3}}, {-49, 1, -48.5}));
   }
   all.push_back(hilly(false));
   all.push_back(hilly(true));

@@ -114,7 +114,7 @@ void expect_contract(const ContractScene& s, const std::vector<Reach>& reaches) 
 }
 
 class MethodContract : public ::testing::TestWithParam<std::size_t> {};
-constexpr std::size_t kAnalyticScenes = 12;
+constexpr std::size_t kAnalyticScenes = 13;
 INSTANTIATE_TEST_SUITE_P(AnalyticScenes, MethodContract,
                          ::testing::Range<std::size_t>(0, kAnalyticScenes));
 
@@ -195,6 +195,43 @@ TEST(MethodContractCell, WallsThatTouchHideWhatIsBehindTheirSeam) {
     }
     EXPECT_GT(behind, 5U);
   }
+}
+
+TEST(MethodContractCell, ADrawnFaceIsListedUnlessAllOfTheCellIsBehindIt) {
+  SceneBuilder b;
+  b.add_mesh(
+      [] {
+        Mesh face;
+        face.positions = {{2, 0, -2}, {2, 3, -2}, {2, 3, 2}, {2, 0, 2}};
+        face.indices = {0, 1, 2, 0, 2, 3};
+        face.primitives = {{0, 2, true, true}};
+        return face;
+      }(),
+      OccluderTag::kNever);
+  b.add_box({0, 0, -2}, {2, 3, 2}, OccluderTag::kOnly);
+  b.add_box({-90, 0, -90}, {-89, 1, -89}, OccluderTag::kNever);
+  const Scene scene = std::move(b).finish();
+  const OccluderSet set = shrunk(scene, Reach::ball(0.5));
+  for (const Way& way : ways()) {
+    if (!way.traits.needs_occluders) continue;
+    const auto method = made(way, scene, set);
+    const auto listed = [&](double x) {
+      const auto pvs = method->solve({{x, 1.5, 6}, Reach::ball(0.5)});
+      EXPECT_TRUE(pvs);
+      return !pvs || lists(*pvs, 0);
+    };
+    EXPECT_TRUE(listed(5)) << way.name();
+    EXPECT_TRUE(listed(1.6)) << way.name() << ": part of the cell is before it";
+    EXPECT_TRUE(listed(1.4999)) << way.name() << ": a pose may be a millimetre outside";
+    EXPECT_FALSE(listed(1.4)) << way.name();
+    EXPECT_FALSE(listed(-5)) << way.name();
+  }
+  OccluderSet other = set;
+  ASSERT_EQ(other.backings.size(), 1U);
+  other.backings[0].object = 2;
+  const auto refused = make_method("cull-map", scene, other);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kMismatch);
 }
 
 TEST(MethodContractCell, AnEyeInsideASolidSeesEverythingFlagged) {

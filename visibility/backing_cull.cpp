@@ -1,0 +1,52 @@
+#include "visibility/backing_cull.h"
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+#include "core/view_cell.h"
+
+namespace ivis {
+namespace {
+
+class BackingCull final : public Method {
+ public:
+  BackingCull(std::unique_ptr<Method> method, const Scene& scene, const OccluderSet& occluders)
+      : method_(std::move(method)), occluders_(occluders), first_(scene.objects.size() + 1, 0) {
+    for (const Backing& b : occluders.backings)
+      ++first_[b.object + 1];
+    for (std::size_t i = 1; i < first_.size(); ++i)
+      first_[i] += first_[i - 1];
+  }
+
+  const MethodTraits& traits() const override { return method_->traits(); }
+  Backend backend() const override { return method_->backend(); }
+
+  Result<Pvs> solve(const ViewCell& cell) const override {
+    auto pvs = method_->solve(cell);
+    if (!pvs || !pvs->everything_because.empty()) return pvs;
+    const Reach reach = padded(cell.reach, occluders_.slack_m);
+    std::erase_if(pvs->objects, [&](ObjectId id) {
+      const std::span<const Backing> planes(occluders_.backings.data() + first_[id],
+                                            first_[id + 1] - first_[id]);
+      return !planes.empty() && std::ranges::all_of(planes, [&](const Backing& b) {
+        return glm::dot(b.plane.normal, cell.eye) + reach.support(b.plane.normal) < b.plane.offset;
+      });
+    });
+    return pvs;
+  }
+
+ private:
+  std::unique_ptr<Method> method_;
+  const OccluderSet& occluders_;
+  std::vector<std::size_t> first_;  ///< backings of object i: [first_[i], first_[i + 1])
+};
+
+}  // namespace
+
+std::unique_ptr<Method> cull_backed(std::unique_ptr<Method> method, const Scene& scene,
+                                    const OccluderSet& occluders) {
+  return std::make_unique<BackingCull>(std::move(method), scene, occluders);
+}
+
+}  // namespace ivis
