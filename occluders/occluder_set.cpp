@@ -122,7 +122,8 @@ Status check_numbers(const OccluderSet& set) {
       return invalid_argument("occluders: a sheet has a number out of range");
   for (std::size_t i = 0; i < set.backings.size(); ++i) {
     const Backing& b = set.backings[i];
-    if (outside(b.plane.normal) || !in_range(b.plane.offset))
+    if (outside(b.plane.normal) || !in_range(b.plane.offset) ||
+        !(b.least_sine >= 0 && b.least_sine <= 1))
       return invalid_argument("occluders: a backing has a number out of range");
     if (i > 0 && b.object < set.backings[i - 1].object)
       return invalid_argument("occluders: backing " + std::to_string(i) + ": object " +

@@ -95,12 +95,14 @@ struct HeightField {
   bool empty() const { return heights.empty(); }
 };
 
-/// A plane in which triangles of an object lie flush against matter, which fills the side
-/// normal.x < offset. An object is hidden from a cell that lies wholly on that side of all its
-/// planes (occluders/backing.h).
+/// A plane behind which, on the side normal.x < offset, matter backs triangles of an object. An
+/// object is hidden from a cell that lies wholly on that side of all its planes, and so that every
+/// sight line to it meets the plane at an angle whose sine is at least `least_sine`
+/// (occluders/backing.h, occluders/wall_backing.h).
 struct Backing {
   ObjectId object = 0;
   ConvexSolid::Plane plane;
+  double least_sine = 0;  ///< 0 to 1
 };
 
 /// Where observers may be. Kept for the record: what counted as solid depends on it.

@@ -14,6 +14,7 @@
 #include "occluders/prism_ladder.h"
 #include "occluders/prisms.h"
 #include "occluders/progress.h"
+#include "occluders/wall_backing.h"
 
 namespace ivis {
 namespace {
@@ -202,6 +203,11 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
     fates[i].volume = found[i].volume;
     fates[i].left_out = std::move(found[i].left_out);
   }
+
+  for (const Backing& b : find_wall_backings(scene, set, context))
+    set.backings.push_back(b);
+  std::ranges::stable_sort(set.backings, {}, &Backing::object);
+  if (context.stopped()) return cancelled();
 
   const std::vector<FusedStack> stacks = fuse(set.solids, set.floor, {}, context);
   if (context.stopped()) return cancelled();

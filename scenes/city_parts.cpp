@@ -20,6 +20,9 @@ enum Colour : std::uint32_t {
   kColours
 };
 
+/// Crowns are leaves, which one looks through here and there: they block no sight line.
+constexpr float kCrown = 0.8F;
+
 GlbMaterial colour(Colour c) {
   switch (c) {
     case kFrame:
@@ -31,9 +34,9 @@ GlbMaterial colour(Colour c) {
     case kMetal:
       return {"metal", {0.15F, 0.16F, 0.17F, 1}};
     case kLeaf:
-      return {"leaf", {0.13F, 0.30F, 0.07F, 1}};
+      return {"leaf", {0.13F, 0.30F, 0.07F, kCrown}, GlbAlpha::kBlend};
     case kNeedle:
-      return {"needle", {0.06F, 0.19F, 0.08F, 1}};
+      return {"needle", {0.06F, 0.19F, 0.08F, kCrown}, GlbAlpha::kBlend};
     case kBark:
       return {"bark", {0.20F, 0.13F, 0.08F, 1}};
     case kLight:

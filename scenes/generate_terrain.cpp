@@ -97,6 +97,9 @@ void revolve(GlbPrimitive& p, std::initializer_list<glm::vec2> profile) {
 
 enum Material : std::uint32_t { kGround, kBark, kNeedle, kLeaf };
 
+/// Crowns are leaves, which one looks through here and there: they block no sight line.
+constexpr float kCrown = 0.8F;
+
 /// One metre high, roots a little below the ground.
 GlbMesh conifer(bool far) {
   GlbMesh mesh{far ? "conifer_far" : "conifer", {}};
@@ -226,8 +229,8 @@ Result<GeneratedScene> generate_terrain(const Dem& dem, const TerrainOptions& op
   scene.copyright = options.copyright;
   scene.materials = {{"ground", {0.30F, 0.28F, 0.20F, 1}},
                      {"bark", {0.20F, 0.13F, 0.08F, 1}},
-                     {"needle", {0.06F, 0.19F, 0.08F, 1}},
-                     {"leaf", {0.13F, 0.30F, 0.07F, 1}}};
+                     {"needle", {0.06F, 0.19F, 0.08F, kCrown}, GlbAlpha::kBlend},
+                     {"leaf", {0.13F, 0.30F, 0.07F, kCrown}, GlbAlpha::kBlend}};
   const std::size_t side = options.tile_cells;
   const std::size_t tiles_x = (grid.cells_x() + side - 1) / side;
   const std::size_t tiles_z = (grid.cells_z() + side - 1) / side;

@@ -12,7 +12,11 @@ namespace {
 class BackingCull final : public Method {
  public:
   BackingCull(std::unique_ptr<Method> method, const Scene& scene, const OccluderSet& occluders)
-      : method_(std::move(method)), occluders_(occluders), first_(scene.objects.size() + 1, 0) {
+
+      : method_(std::move(method)),
+        scene_(scene),
+        occluders_(occluders),
+        first_(scene.objects.size() + 1, 0) {
     for (const Backing& b : occluders.backings)
       ++first_[b.object + 1];
     for (std::size_t i = 1; i < first_.size(); ++i)
@@ -26,11 +30,20 @@ class BackingCull final : public Method {
     auto pvs = method_->solve(cell);
     if (!pvs || !pvs->everything_because.empty()) return pvs;
     const Reach reach = padded(cell.reach, occluders_.slack_m);
+    const double move = glm::length(reach.half_extents());
     std::erase_if(pvs->objects, [&](ObjectId id) {
       const std::span<const Backing> planes(occluders_.backings.data() + first_[id],
                                             first_[id + 1] - first_[id]);
-      return !planes.empty() && std::ranges::all_of(planes, [&](const Backing& b) {
-        return glm::dot(b.plane.normal, cell.eye) + reach.support(b.plane.normal) < b.plane.offset;
+      if (planes.empty()) return false;
+      return std::ranges::all_of(planes, [&](const Backing& b) {
+        const double behind =
+            b.plane.offset - glm::dot(b.plane.normal, cell.eye) - reach.support(b.plane.normal);
+        if (!(behind > 0)) return false;
+        if (b.least_sine == 0) return true;
+        // Of the farthest: no point of the object is farther from any viewpoint.
+        const Aabb& box = scene_.objects[id].bounds;
+        const Vec3 far = glm::max(glm::abs(box.lo - cell.eye), glm::abs(box.hi - cell.eye));
+        return behind >= b.least_sine * (glm::length(far) + move);
       });
     });
     return pvs;
@@ -38,6 +51,7 @@ class BackingCull final : public Method {
 
  private:
   std::unique_ptr<Method> method_;
+  const Scene& scene_;
   const OccluderSet& occluders_;
   std::vector<std::size_t> first_;  ///< backings of object i: [first_[i], first_[i + 1])
 };

@@ -6,8 +6,8 @@
 
 namespace ivis {
 
-/// Another method's answers, without the objects that lie flush against matter and are seen from
-/// behind it only (OccluderSet::backings).
+/// Another method's answers, without the objects that the cell lies behind: on the far side of what
+/// they lie against or hang on (OccluderSet::backings).
 /// Guarantee: the method's own. Ownership: owns `method`, borrows scene and occluders. Threads,
 ///            errors: as the method.
 /// Cost:      some ten nanoseconds a listed object that has backings.

@@ -397,6 +397,32 @@ TEST(VerifierPower, FindsThatAGuardOfTheMapIsTakenOut) {
       "far_end_below_eye", [](PolarGuards& g) { g.far_end_below_eye = false; }, false, 30, 64);
 }
 
+TEST(VerifierPower, FindsThatThingsOnWallsAreTakenForHiddenAtAGraze) {
+  SceneBuilder b;
+  for (int i = 0; i < 20; ++i)  // on the far side, near the house's end
+    b.add_box({9.4, 1 + i * 0.4, -10.2}, {9.7, 1.3 + i * 0.4, -10}, OccluderTag::kNever);
+  b.add_box({0, 0, -10}, {10, 10, 0});
+  const Scene scene = std::move(b).finish();
+  OccluderSet set = shrunk(scene, Reach::disc(0.5));
+  ASSERT_GT(set.backings.size(), 15U);
+  const ViewCell along{{60, 5, -9}, Reach::disc(0.5)};
+  for (const bool guarded : {true, false}) {
+    if (!guarded)
+      for (Backing& wall : set.backings)
+        wall.least_sine = 0;
+    const auto method = make_method("cull-map", scene, set);
+    ASSERT_TRUE(method);
+    const auto pvs = (*method)->solve(along);
+    ASSERT_TRUE(pvs);
+    EXPECT_EQ(misses(Verifier(scene, &set), *pvs) > 0, !guarded);
+    // From well behind, all of them are hidden.
+    const auto behind = (*method)->solve({{9.5, 5, 30}, Reach::disc(0.5)});
+    ASSERT_TRUE(behind);
+    EXPECT_LE(behind->objects.size(), 3U);
+    EXPECT_EQ(misses(Verifier(scene, &set), *behind), 0U);
+  }
+}
+
 TEST(VerifierPower, FindsThatTheLeastOverABinIsNotTaken) {
   const Reach reach = Reach::disc(0.5);
   SceneBuilder b;
