@@ -218,6 +218,42 @@ TEST(GlOcclusionMap, ALostContextIsAnErrorAndUnderAutoTheCpuTakesOver) {
   EXPECT_EQ(log.size(), 1U);
 }
 
+TEST(GlOcclusionMap, FacesInSeveralPagesGiveTheSameAnswer) {
+  IVIS_NEEDS_GL;
+  SceneBuilder b;
+  for (int i = 0; i < 60; ++i) {
+    const double angle = 0.7 * i;
+    const Vec3 at{(10 + i) * std::cos(angle), 0, (10 + i) * std::sin(angle)};
+    b.add_box(at - Vec3{2, 0, 2}, at + Vec3{2, 6, 2});
+    b.add_box(1.5 * at - 0.2, 1.5 * at + 0.2, OccluderTag::kNever);
+  }
+  const Scene scene = std::move(b).finish();
+  const OccluderSet set = shrunk(scene, Reach::ball(0.3));
+  const ViewCell cell{{0, 1.7, 0}, Reach::ball(0.3)};
+  GlOcclusionMap::Stats whole_stats;
+  const auto whole = gl_map(scene, set)->solve(cell, whole_stats);
+  ASSERT_TRUE(whole);
+  EXPECT_LT(whole->objects.size(), 110U);
+  EXPECT_GT(whole_stats.faces_drawn, 100U);
+  for (const std::size_t bytes : {2048U, 8192U}) {
+    auto paged = GlOcclusionMap::create(software_context(), scene, set, {}, {}, bytes);
+    ASSERT_TRUE(paged) << paged.error().message;
+    GlOcclusionMap::Stats stats;
+    for (int round = 0; round < 2; ++round) {
+      stats = {};
+      const auto pvs = (*paged)->solve(cell, stats);
+      ASSERT_TRUE(pvs);
+      EXPECT_EQ(pvs->objects, whole->objects) << bytes;
+      EXPECT_EQ(stats.faces_drawn, whole_stats.faces_drawn) << bytes;
+    }
+  }
+  const auto narrow = GlOcclusionMap::create(software_context(), scene, set, {}, {}, 256);
+  ASSERT_FALSE(narrow);
+  EXPECT_EQ(narrow.error().code, ErrorCode::kUnsupported);
+  EXPECT_NE(narrow.error().message.find("at most 256 fit"), std::string::npos)
+      << narrow.error().message;
+}
+
 TEST(GlOcclusionMap, ThreadsTakeTurnsAndGetTheSameAnswers) {
   IVIS_NEEDS_GL;
   const Reach reach = Reach::ball(0.3);

@@ -18,8 +18,10 @@
 namespace ivis {
 namespace {
 
-constexpr std::size_t kFaceFloats = 16;
-constexpr std::size_t kBoxFloats = 8;
+constexpr GLint kFaceBytes = 64;
+/// A face at most is drawn on a side: so its refs, a sixteenth as many bytes, fit in any page, and
+/// its vertices into the 31 bits that a draw call counts in.
+constexpr GLint kMostPageBytes = 1 << 30;
 constexpr double kRoundingPixels = 1.0 / 64;
 
 float down(double v) {
@@ -110,17 +112,15 @@ GlOcclusionMap::GlOcclusionMap(std::unique_ptr<GlContext> context, const Scene& 
   options_.map_pixels = pixels_for(options.map_pixels, occluders.reach);
 }
 
-Result<std::unique_ptr<GlOcclusionMap>> GlOcclusionMap::create(std::unique_ptr<GlContext> context,
-                                                               const Scene& scene,
-                                                               const OccluderSet& occluders,
-                                                               const MethodOptions& options,
-                                                               const OcclusionGuards& guards) {
+Result<std::unique_ptr<GlOcclusionMap>> GlOcclusionMap::create(
+    std::unique_ptr<GlContext> context, const Scene& scene, const OccluderSet& occluders,
+    const MethodOptions& options, const OcclusionGuards& guards, std::size_t page_bytes) {
   std::unique_ptr<GlOcclusionMap> map(
       new GlOcclusionMap(std::move(context), scene, occluders, options, guards));
   const std::uint32_t pixels = map->options_.map_pixels;
   IVIS_ASSERT(pixels % 16 == 0 && pixels >= 64 && pixels <= 4096,
               "pixels a face: a multiple of 16 from 64 to 4096");
-  if (auto s = map->prepare(); !s) return s.error();
+  if (auto s = map->prepare(page_bytes); !s) return s.error();
   return map;
 }
 
@@ -133,22 +133,52 @@ const MethodTraits& GlOcclusionMap::traits() const {
   return same;
 }
 
-Status GlOcclusionMap::prepare() {
+/// The pieces' faces as the shaders read them, in pages.
+Result<std::vector<float>> GlOcclusionMap::take_faces(std::size_t page_bytes) {
+  const auto most = static_cast<std::size_t>(
+      std::clamp(limit(GL_MAX_SHADER_STORAGE_BLOCK_SIZE), 0, kMostPageBytes));
+  const auto step = static_cast<std::size_t>(
+      std::max(limit(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT), kFaceBytes));
+  if (!std::has_single_bit(step))
+    return unsupported("OpenGL: storage buffers are aligned to " + std::to_string(step) +
+                       " bytes (" + context_->renderer() + ")");
+  page_bytes_ = (page_bytes > 0 ? std::min(page_bytes, most) : most) / step * step;
   std::vector<float> faces;
   levels_.reserve(pieces_.levels.size());
+  std::size_t begin = 0;  // of the page, in bytes
+  std::size_t end = 0;
   for (const OccluderPieces::Level& level : pieces_.levels) {
-    Level out{static_cast<std::uint32_t>(faces.size() / kFaceFloats), 0};
+    std::vector<float> values;
     for (const FaceBatch& b : pieces_.faces(level))
       for (std::uint32_t lane = 0; lane < FaceBatch::kWidth; ++lane) {
         if (b.nx[lane] == 0 && b.ny[lane] == 0 && b.nz[lane] == 0) continue;
         const float fourth[4] = {b.nx[lane], b.ny[lane], b.nz[lane], 0};
         for (std::size_t c = 0; c < 4; ++c)
-          faces.insert(faces.end(), {b.x[c][lane], b.y[c][lane], b.z[c][lane], fourth[c]});
-        ++out.faces;
+          values.insert(values.end(), {b.x[c][lane], b.y[c][lane], b.z[c][lane], fourth[c]});
       }
-    levels_.push_back(out);
+    const std::size_t bytes = values.size() * sizeof(float);
+    if (bytes > page_bytes_)
+      return unsupported("OpenGL: an occluder takes " + std::to_string(bytes) + " bytes, at most " +
+                         std::to_string(page_bytes_) + " fit (" + context_->renderer() + ")");
+    if (end + bytes - begin > page_bytes_) {
+      pages_.push_back(end - begin);
+      begin += page_bytes_;
+      end = begin;
+      faces.resize(begin / sizeof(float));
+    }
+    levels_.push_back({static_cast<std::uint32_t>(pages_.size()),
+                       static_cast<std::uint32_t>((end - begin) / kFaceBytes),
+                       static_cast<std::uint32_t>(bytes / kFaceBytes)});
+    faces.insert(faces.end(), values.begin(), values.end());
+    end += bytes;
   }
+  if (end > begin) pages_.push_back(end - begin);
+  refs_of_.resize(6 * pages_.size());
   pieces_.batches = {};  // the context has them
+  return faces;
+}
+
+Status GlOcclusionMap::prepare(std::size_t page_bytes) {
   std::vector<float> boxes;
   const SubBoxes sub_boxes(scene_, frame_);
   for (ObjectId id = 0; id < scene_.objects.size(); ++id) {
@@ -176,12 +206,14 @@ Status GlOcclusionMap::prepare() {
 
   const auto current = context_->make_current();
   if (!current) return current.error();
+  const auto faces = take_faces(page_bytes);
+  if (!faces) return faces.error();
   // No more than what the standard promises, whatever the driver says.
   const int bits = std::clamp(limit(GL_SUBPIXEL_BITS), 0, 4);
   snap_ = static_cast<float>(std::exp2(-bits) + kRoundingPixels);
   if (auto s = make_programs(); !s) return s;
   if (auto s = make_map(); !s) return s;
-  if (auto s = upload(faces, boxes); !s) return s;
+  if (auto s = upload(*faces, boxes); !s) return s;
   return context_->check();
 }
 
@@ -202,12 +234,12 @@ Status GlOcclusionMap::make_programs() {
   test_program_ = *test;
 
   const auto pixels = static_cast<float>(options_.map_pixels);
-  glProgramUniform1f(draw_program_, 3, pixels);
-  glProgramUniform1f(draw_program_, 4, near_m_);
-  glProgramUniform1f(draw_program_, 5, snap_);
-  glProgramUniform1f(draw_program_, 6, kDepthGuard);
-  glProgramUniform1f(draw_program_, 7, kEdgeOn);
-  glProgramUniform1f(draw_program_, 8, pixels / 32768);
+  glProgramUniform1f(draw_program_, 2, pixels);
+  glProgramUniform1f(draw_program_, 3, near_m_);
+  glProgramUniform1f(draw_program_, 4, snap_);
+  glProgramUniform1f(draw_program_, 5, kDepthGuard);
+  glProgramUniform1f(draw_program_, 6, kEdgeOn);
+  glProgramUniform1f(draw_program_, 7, pixels / 32768);
   glProgramUniform1ui(test_program_, 1, static_cast<GLuint>(ids_.size()));
   glProgramUniform1f(test_program_, 2, pixels);
   glProgramUniform1f(test_program_, 3, near_m_);
@@ -250,11 +282,10 @@ Status GlOcclusionMap::make_map() {
 
 Status GlOcclusionMap::upload(const std::vector<float>& faces, const std::vector<float>& boxes) {
   const auto most = static_cast<std::size_t>(limit(GL_MAX_SHADER_STORAGE_BLOCK_SIZE));
-  for (const auto& [what, values] : {std::pair{"occluders", &faces}, std::pair{"objects", &boxes}})
-    if (values->size() * sizeof(float) > most)
-      return unsupported("OpenGL: the " + std::string(what) + " take " +
-                         std::to_string(values->size() * sizeof(float)) + " bytes, at most " +
-                         std::to_string(most) + " fit (" + context_->renderer() + ")");
+  if (boxes.size() * sizeof(float) > most)
+    return unsupported("OpenGL: the objects take " + std::to_string(boxes.size() * sizeof(float)) +
+                       " bytes, at most " + std::to_string(most) + " fit (" + context_->renderer() +
+                       ")");
   const auto fill = [](GLuint& buffer, const std::vector<float>& values) {
     const float none = 0;
     glCreateBuffers(1, &buffer);
@@ -305,7 +336,7 @@ void GlOcclusionMap::choose(const MapCell& cell, Stats& stats) const {
   const auto pixels = static_cast<double>(options_.map_pixels);
   const SampleMargin margin{1.01 * std::numbers::sqrt2 * (1 + 2 * static_cast<double>(snap_)),
                             pixels};
-  for (auto& refs : side_refs_)
+  for (auto& refs : refs_of_)
     refs.clear();
   const auto add = [&](const OccluderPieces::Piece& piece) {
     const std::uint32_t touched = sides_of(piece, cell.eye, static_cast<double>(near_m_));
@@ -323,7 +354,7 @@ void GlOcclusionMap::choose(const MapCell& cell, Stats& stats) const {
     const Level& level = levels_[chosen.level];
     const std::uint32_t sheet = piece.kind == OccluderPieces::Kind::kSheet ? 1 : 0;
     for (std::uint32_t left = chosen.sides; left != 0; left &= left - 1) {
-      auto& refs = side_refs_[std::countr_zero(left)];
+      auto& refs = refs_of_[6 * level.page + static_cast<std::uint32_t>(std::countr_zero(left))];
       for (std::uint32_t f = level.first; f < level.first + level.faces; ++f)
         refs.push_back(2 * f + sheet);
     }
@@ -335,47 +366,43 @@ void GlOcclusionMap::choose(const MapCell& cell, Stats& stats) const {
     for (const OccluderPieces::Piece& piece : pieces_.pieces)
       add(piece);
   }
-  for (const auto& refs : side_refs_)
+  for (const auto& refs : refs_of_)
     stats.faces_drawn += static_cast<std::uint32_t>(refs.size());
 }
 
-/// Draws, builds the pyramid, tests, and reads `bits_` back.
-void GlOcclusionMap::run(const MapCell& cell) const {
+void GlOcclusionMap::draw(const MapCell& cell) const {
   const auto n = static_cast<GLsizei>(options_.map_pixels);
   const GLfloat nothing = 0;
-  all_refs_.clear();
-  for (const auto& refs : side_refs_)
-    all_refs_.insert(all_refs_.end(), refs.begin(), refs.end());
-  if (!all_refs_.empty())
-    glNamedBufferData(refs_, static_cast<GLsizeiptr>(all_refs_.size() * 4), all_refs_.data(),
-                      GL_STREAM_DRAW);
-
   glViewport(0, 0, n, n);
   glDepthMask(GL_TRUE);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_GREATER);
   glBindVertexArray(empty_array_);
   glUseProgram(draw_program_);
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, faces_);
-  if (!all_refs_.empty()) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, refs_);
   glUniform3f(0, cell.single[0], cell.single[1], cell.single[2]);
-  // A draw call's vertices are counted in 31 bits.
-  constexpr std::size_t kMostFaces = 0x7fffffff / 6;
-  std::size_t first = 0;
   for (std::uint32_t side = 0; side < 6; ++side) {
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, targets_[side]);
     glClearBufferfv(GL_DEPTH, 0, &nothing);
-    glUniform1ui(2, side);
-    for (std::size_t left = side_refs_[side].size(); left > 0;) {
-      const std::size_t now = std::min(left, kMostFaces);
-      glUniform1ui(1, static_cast<GLuint>(first));
-      glDrawArrays(GL_TRIANGLES, 0, static_cast<GLsizei>(6 * now));
-      first += now;
-      left -= now;
+    glUniform1ui(1, side);
+    for (std::size_t page = 0; page < pages_.size(); ++page) {
+      const auto& refs = refs_of_[6 * page + side];
+      if (refs.empty()) continue;
+      glNamedBufferData(refs_, static_cast<GLsizeiptr>(refs.size() * 4), refs.data(),
+                        GL_STREAM_DRAW);
+      glBindBufferRange(GL_SHADER_STORAGE_BUFFER, 0, faces_,
+                        static_cast<GLintptr>(page * page_bytes_),
+                        static_cast<GLsizeiptr>(pages_[page]));
+      glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, refs_);
+      glDrawArrays(GL_TRIANGLES, 0, static_cast<GLsizei>(6 * refs.size()));
     }
   }
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
+}
 
+/// Draws, builds the pyramid, tests, and reads `bits_` back.
+void GlOcclusionMap::run(const MapCell& cell) const {
+  const auto n = static_cast<GLsizei>(options_.map_pixels);
+  draw(cell);
   glBindTextureUnit(0, depth_);
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, pyramid_);
   glUseProgram(pyramid_program_);

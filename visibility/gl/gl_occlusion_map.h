@@ -59,11 +59,11 @@ class GlOcclusionMap : public Method {
   };
 
   /// Errors: kUnsupported: the context lacks something, or the scene is too large for it.
-  static Result<std::unique_ptr<GlOcclusionMap>> create(std::unique_ptr<GlContext> context,
-                                                        const Scene& scene,
-                                                        const OccluderSet& occluders,
-                                                        const MethodOptions& options,
-                                                        const OcclusionGuards& guards = {});
+  /// `page_bytes`: how much of the faces shaders see at a time; 0: as much as the context lets
+  /// them. For tests.
+  static Result<std::unique_ptr<GlOcclusionMap>> create(
+      std::unique_ptr<GlContext> context, const Scene& scene, const OccluderSet& occluders,
+      const MethodOptions& options, const OcclusionGuards& guards = {}, std::size_t page_bytes = 0);
   const MethodTraits& traits() const override;
   Backend backend() const override { return Backend::kGl; }
   Result<Pvs> solve(const ViewCell& cell) const override;
@@ -73,18 +73,22 @@ class GlOcclusionMap : public Method {
   GlContext& context() { return *context_; }
 
  private:
+  /// Of the buffer of faces, which is bound a page at a time; no level goes over a page's end.
   struct Level {
-    std::uint32_t first = 0;
+    std::uint32_t page = 0;
+    std::uint32_t first = 0;  ///< in the page
     std::uint32_t faces = 0;
   };
 
   GlOcclusionMap(std::unique_ptr<GlContext> context, const Scene& scene,
                  const OccluderSet& occluders, const MethodOptions& options,
                  const OcclusionGuards& guards);
-  Status prepare();
+  Status prepare(std::size_t page_bytes);
+  Result<std::vector<float>> take_faces(std::size_t page_bytes);
   Status make_programs();
   Status make_map();
   Status upload(const std::vector<float>& faces, const std::vector<float>& boxes);
+  void draw(const MapCell& cell) const;
   void choose(const MapCell& cell, Stats& stats) const;
   void run(const MapCell& cell) const;
 
@@ -104,12 +108,15 @@ class GlOcclusionMap : public Method {
   std::uint32_t draw_program_ = 0, pyramid_program_ = 0, test_program_ = 0;
   std::uint32_t depth_ = 0, targets_[6] = {}, empty_array_ = 0;
   std::uint32_t faces_ = 0, refs_ = 0, pyramid_ = 0, boxes_ = 0, visible_ = 0;
+  std::size_t page_bytes_ = 0;
+  std::vector<std::size_t> pages_;    ///< bytes used of each
   std::vector<std::int32_t> begins_;  ///< of the pyramid's levels 1, 2, ...
   float snap_ = 0;
 
   mutable std::mutex mutex_;
-  mutable std::vector<std::uint32_t> side_refs_[6];
-  mutable std::vector<std::uint32_t> all_refs_, bits_, found_;
+  /// Faces to draw, a list a page and side: refs_of_[6 * page + side].
+  mutable std::vector<std::vector<std::uint32_t>> refs_of_;
+  mutable std::vector<std::uint32_t> bits_, found_;
   mutable std::vector<std::uint64_t> scratch_;
   std::unique_ptr<GlContext> context_;
 };

@@ -15,21 +15,20 @@ struct Face { vec4 corner[4]; };  // of the first three w: the normal
 layout(std430, binding = 0) readonly buffer Faces { Face faces[]; };
 layout(std430, binding = 1) readonly buffer Refs { uint refs[]; };  // 2 * face + sheet
 layout(location = 0) uniform vec3 eye;
-layout(location = 1) uniform uint first_ref;
-layout(location = 2) uniform uint side;
-layout(location = 3) uniform float pixels;
-layout(location = 4) uniform float near_m;
-layout(location = 5) uniform float snap;  // pixels
-layout(location = 6) uniform float depth_guard;
-layout(location = 7) uniform float edge_on;
-layout(location = 8) uniform float clip_ratio;
+layout(location = 1) uniform uint side;
+layout(location = 2) uniform float pixels;
+layout(location = 3) uniform float near_m;
+layout(location = 4) uniform float snap;  // pixels
+layout(location = 5) uniform float depth_guard;
+layout(location = 6) uniform float edge_on;
+layout(location = 7) uniform float clip_ratio;
 flat out vec3 depth;  // near / w = depth.x + depth.y i + depth.z j
 flat out vec3 edges[4];
 const int kCorner[6] = int[6](0, 1, 2, 0, 2, 3);
 
 void main() {
   uint index = uint(gl_VertexID);
-  uint ref = refs[first_ref + index / 6u];
+  uint ref = refs[index / 6u];
   Face face = faces[ref >> 1u];
   vec3 p[4];
   float size = 0.0;
