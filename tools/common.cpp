@@ -203,6 +203,11 @@ void SolveArgs::add_to(CLI::App& app, bool reach_required) {
                  "draw only the N occluders of largest projected area; 0: all that show")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);
+  app.add_option("--selection", selection,
+                 "which occluders to draw, along a path: conservative: all that show; temporal: "
+                 "those that showed at the last pose; two-pass: those that show past these")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"conservative", "temporal", "two-pass"}));
   app.add_option("--map-pixels", map_pixels,
                  "pixels a side of the occlusion map's six faces, a multiple of 16 from 64 to "
                  "4096: more hide more and cost more "
@@ -303,6 +308,9 @@ Result<std::unique_ptr<Method>> SolveArgs::make(const Scene& scene, const Occlud
   options.map = map == "polar" ? CullMapKind::kPolar : CullMapKind::kOrthographic;
   options.threads = threads;
   options.max_occluders = max_occluders;
+  options.selection = selection == "temporal"   ? Selection::kTemporal
+                      : selection == "two-pass" ? Selection::kTwoPass
+                                                : Selection::kConservative;
   options.map_pixels = map_pixels;
   options.rays = rays;
   options.backend = backend == "auto"  ? Backend::kAuto

@@ -88,6 +88,7 @@ struct SolveArgs {
   std::filesystem::path occluders;
   unsigned threads = 1;
   std::size_t max_occluders = 0;
+  std::string selection = "conservative";
   std::uint32_t map_pixels = MethodOptions{}.map_pixels;
   std::size_t rays = 256;
   std::string frustum;

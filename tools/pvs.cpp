@@ -23,10 +23,10 @@ struct Timed {
   double wall_ms = 0;
 };
 
-Result<Timed> timed_solve(const Method& method, const ViewCell& cell) {
+Result<Timed> timed_solve(const Method& method, const ViewCell& cell, LastShown& last) {
   const auto wall = std::chrono::steady_clock::now();
   const double cpu = cpu_seconds();
-  auto pvs = method.solve(cell);
+  auto pvs = method.solve(cell, last);
   const double cpu_ms = (cpu_seconds() - cpu) * 1e3;
   const std::chrono::duration<double, std::milli> wall_ms = std::chrono::steady_clock::now() - wall;
   if (!pvs) return pvs.error();
@@ -37,7 +37,8 @@ Outcome one_eye(const PvsArgs& args, const Scene& scene, const Method& method,
                 const ViewCell& cell) {
   // Once to warm caches and take memory, once to time.
   if (auto warm = method.solve(cell); !warm) return warm.error();
-  const auto t = timed_solve(method, cell);
+  LastShown last;
+  const auto t = timed_solve(method, cell, last);
   if (!t) return t.error();
   const MethodTraits& traits = method.traits();
   const char* guarantee = to_string(traits.guarantee);
@@ -73,12 +74,13 @@ Outcome along_path(const PvsArgs& args, const std::vector<Pose>& path, const Sce
   }
   if (auto warm = method.solve({path.front().eye, reach}); !warm) return warm.error();
   Json poses = Json::array();
+  LastShown last;
   std::vector<double> counts;
   std::vector<double> compute;
   std::vector<double> wall;
   for (std::size_t row = 0; row < path.size(); ++row) {
     if (context.stopped()) return cancelled();
-    const auto t = timed_solve(method, {path[row].eye, reach});
+    const auto t = timed_solve(method, {path[row].eye, reach}, last);
     if (!t) return t.error();
     counts.push_back(static_cast<double>(t->pvs.objects.size()));
     compute.push_back(t->compute_ms);

@@ -95,8 +95,9 @@ Outcome verify_path(const VerifyArgs& args, const Context& context) {
   options.frustum = *frustum;
   const Verifier verifier(scene, &occluders, blockers(args));
   Summary summary;
+  LastShown last;
   for (std::size_t row = 0; row < path->size(); row += args.stride) {
-    const auto pvs = method->solve({(*path)[row].eye, *reach});
+    const auto pvs = method->solve({(*path)[row].eye, *reach}, last);
     if (!pvs) return pvs.error();
     const auto report = verifier.check(*pvs, options, without_progress(context));
     if (!report) return report.error();

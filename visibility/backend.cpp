@@ -46,7 +46,12 @@ class GlWhileItWorks : public Method {
 
 Result<std::unique_ptr<Method>> make_occlusion_map(const Scene& scene, const OccluderSet& occluders,
                                                    const MethodOptions& options) {
-  if (options.backend != Backend::kCpu && options.make_gl) {
+  const bool needs_cpu = options.selection != Selection::kConservative;
+  if (needs_cpu && options.backend == Backend::kGl)
+    return invalid_argument(
+        "the OpenGL occlusion map draws all occluders; selecting them is the "
+        "CPU's (--backend cpu)");
+  if (options.backend != Backend::kCpu && options.make_gl && !needs_cpu) {
     auto gl = options.make_gl(scene, occluders, options);
     if (options.backend == Backend::kGl) return gl;
     if (gl)

@@ -27,7 +27,14 @@ class BackingCull final : public Method {
   Backend backend() const override { return method_->backend(); }
 
   Result<Pvs> solve(const ViewCell& cell) const override {
-    auto pvs = method_->solve(cell);
+    return culled(method_->solve(cell), cell);
+  }
+  Result<Pvs> solve(const ViewCell& cell, LastShown& last) const override {
+    return culled(method_->solve(cell, last), cell);
+  }
+
+ private:
+  Result<Pvs> culled(Result<Pvs> pvs, const ViewCell& cell) const {
     if (!pvs || !pvs->everything_because.empty()) return pvs;
     const Reach reach = padded(cell.reach, occluders_.slack_m);
     const double move = glm::length(reach.half_extents());
@@ -49,7 +56,6 @@ class BackingCull final : public Method {
     return pvs;
   }
 
- private:
   std::unique_ptr<Method> method_;
   const Scene& scene_;
   const OccluderSet& occluders_;

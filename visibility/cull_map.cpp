@@ -136,10 +136,19 @@ void CullMap::give_back(std::unique_ptr<Scratch> scratch) const {
 
 Result<Pvs> CullMap::solve(const ViewCell& cell) const {
   Stats stats;
-  return solve(cell, stats);
+  return solve(cell, nullptr, stats);
+}
+
+Result<Pvs> CullMap::solve(const ViewCell& cell, LastShown& last) const {
+  Stats stats;
+  return solve(cell, &last, stats);
 }
 
 Result<Pvs> CullMap::solve(const ViewCell& cell, Stats& stats) const {
+  return solve(cell, nullptr, stats);
+}
+
+Result<Pvs> CullMap::solve(const ViewCell& cell, LastShown* last, Stats& stats) const {
   if (auto checked = check_cell(cell, occluders_); !checked) return checked.error();
   Pvs pvs = empty_answer(scene_, cell);
   const Vec3 half = padded(cell.reach, occluders_.slack_m).half_extents();
@@ -170,21 +179,46 @@ Result<Pvs> CullMap::solve(const ViewCell& cell, Stats& stats) const {
 
   auto scratch = take_scratch();
   scratch->visible.clear();
-  if (orthographic_) {
-    find_orthographic(eye, *scratch);
-  } else {
-    find_polar(eye, *scratch, stats);
-  }
+  draw_selected(eye, last, *scratch, stats);
+  find_objects(eye, *scratch, stats);
   list_ascending(scene_.objects.size(), scratch->visible, always_visible_, scratch->bits, pvs);
   give_back(std::move(scratch));
   return pvs;
 }
 
+/// What MethodOptions::selection says. Drawing less is always safe.
+void CullMap::draw_selected(const Eye& eye, LastShown* last, Scratch& scratch, Stats& stats) const {
+  if (last == nullptr || options_.selection == Selection::kConservative) {
+    draw(eye, largest_solids(eye, nullptr), scratch, stats);
+    return;
+  }
+  draw(eye, largest_solids(eye, last->known ? &last->occluders : nullptr), scratch, stats);
+  last->occluders.clear();
+  find(walls_.tree, eye, scratch, last->occluders, stats);
+  if (last->known && options_.selection == Selection::kTwoPass)
+    draw(eye, largest_solids(eye, &last->occluders), scratch, stats);
+  last->known = true;
+}
+
+void CullMap::draw(const Eye& eye, const Chosen& chosen, Scratch& scratch, Stats& stats) const {
+  if (orthographic_)
+    draw_orthographic(eye, chosen, scratch);
+  else
+    draw_polar(eye, chosen, scratch, stats);
+}
+
 /// The options_.max_occluders solids of largest projected area (width times height over distance
-/// squared), near ones first.
-std::vector<std::uint32_t> CullMap::largest_solids(const Eye& eye) const {
+/// squared), near ones first; of `among`, if that is given.
+CullMap::Chosen CullMap::largest_solids(const Eye& eye,
+                                        const std::vector<std::uint32_t>* among) const {
+  const std::size_t given = among != nullptr ? among->size() : walls_.solids.size();
+  const std::size_t most = options_.max_occluders > 0 ? options_.max_occluders : given;
+  if (among == nullptr && most >= given) return {};
+  std::vector<bool> wanted(walls_.solids.size(), among == nullptr);
+  if (among != nullptr)
+    for (const std::uint32_t s : *among)
+      wanted[s] = true;
   std::vector<std::uint32_t> chosen;
-  if (options_.max_occluders == 0 || options_.max_occluders >= walls_.solids.size()) return chosen;
   struct Candidate {
     double area;
     double distance;
@@ -193,7 +227,8 @@ std::vector<std::uint32_t> CullMap::largest_solids(const Eye& eye) const {
   std::vector<Candidate> all;
   for (const BoxTree::Node& node : walls_.tree.nodes)
     for (std::uint32_t c = 0; c < node.count; ++c) {
-      if ((node.child[c] & BoxTree::kItem) == 0) continue;
+      if ((node.child[c] & BoxTree::kItem) == 0 || !wanted[node.child[c] & ~BoxTree::kItem])
+        continue;
       const auto at = [](float v) { return static_cast<double>(v); };
       const double dx =
           std::max({at(node.lo_x[c]) - eye.apex.x, eye.apex.x - at(node.hi_x[c]), 0.0});
@@ -211,7 +246,7 @@ std::vector<std::uint32_t> CullMap::largest_solids(const Eye& eye) const {
   const auto nearer = [](const Candidate& a, const Candidate& b) {
     return a.distance != b.distance ? a.distance < b.distance : a.solid < b.solid;
   };
-  const auto end = all.begin() + static_cast<std::ptrdiff_t>(options_.max_occluders);
+  const auto end = all.begin() + static_cast<std::ptrdiff_t>(std::min(most, all.size()));
   std::nth_element(all.begin(), end, all.end(), larger);
   std::sort(all.begin(), end, nearer);
   for (auto it = all.begin(); it != end; ++it)
@@ -219,20 +254,90 @@ std::vector<std::uint32_t> CullMap::largest_solids(const Eye& eye) const {
   return chosen;
 }
 
-void CullMap::find_polar(const Eye& eye, Scratch& scratch, Stats& stats) const {
+void CullMap::draw_polar(const Eye& eye, const Chosen& chosen, Scratch& scratch,
+                         Stats& stats) const {
   scratch.polar.clear();
   scratch.polar.set_horizon(nullptr);
   if (terrain_) {
     terrain_->draw(eye.single, scratch.horizon);
     if (!scratch.horizon.empty()) scratch.polar.set_horizon(&scratch.horizon);
   }
-  draw_walls(walls_, eye.single, eye.floors, largest_solids(eye), guards_, scratch.polar,
-             stats.polar);
+  if (!chosen)
+    draw_walls(walls_, eye.single, eye.floors, {}, guards_, scratch.polar, stats.polar);
+  else if (!chosen->empty())
+    draw_walls(walls_, eye.single, eye.floors, *chosen, guards_, scratch.polar, stats.polar);
   scratch.polar.finish(eye.floors.undersides);
-  if (objects_.nodes.empty()) return;
-  if (options_.threads <= 1) {
-    find_visible(objects_, 0, eye.single, eye.floors.undersides, scratch.polar, scratch.visible,
-                 stats.polar);
+}
+
+/// Does the orthographic map hide a child of a node?
+bool CullMap::hidden_orthographic(const BoxTree::Node& node, std::uint32_t c, const Eye& eye,
+                                  const Scratch& scratch, bool finished) const {
+  const double top = static_cast<double>(node.hi_y[c]) - eye.apex.y;
+  return orthographic_->hides(
+      scratch.heights, {static_cast<double>(node.lo_x[c]), static_cast<double>(node.lo_z[c])},
+      {static_cast<double>(node.hi_x[c]), static_cast<double>(node.hi_z[c])},
+      static_cast<float>(top + 1e-6 * std::abs(top)), finished);
+}
+
+/// Without a choice: solids near first, skipping what is in shadow already.
+void CullMap::draw_orthographic(const Eye& eye, const Chosen& chosen, Scratch& scratch) const {
+  orthographic_->clear(scratch.heights);
+  if (chosen) {
+    for (const std::uint32_t s : *chosen)
+      draw_orthographic(s, eye, scratch);
+  } else {
+    struct Near {
+      double distance;
+      const BoxTree::Node* node;
+      std::uint32_t child;
+    };
+    std::vector<Near> all;
+    for (const BoxTree::Node& node : walls_.tree.nodes)
+      for (std::uint32_t c = 0; c < node.count; ++c) {
+        if ((node.child[c] & BoxTree::kItem) == 0) continue;
+        const double dx = std::max({static_cast<double>(node.lo_x[c]) - eye.apex.x,
+                                    eye.apex.x - static_cast<double>(node.hi_x[c]), 0.0});
+        const double dz = std::max({static_cast<double>(node.lo_z[c]) - eye.apex.z,
+                                    eye.apex.z - static_cast<double>(node.hi_z[c]), 0.0});
+        all.push_back({std::max(dx, dz), &node, c});
+      }
+    std::sort(all.begin(), all.end(), [](const Near& a, const Near& b) {
+      return a.distance != b.distance ? a.distance < b.distance
+                                      : a.node->child[a.child] < b.node->child[b.child];
+    });
+    for (const Near& n : all)
+      if (!hidden_orthographic(*n.node, n.child, eye, scratch, false))
+        draw_orthographic(n.node->child[n.child] & ~BoxTree::kItem, eye, scratch);
+  }
+  orthographic_->finish(scratch.heights);
+}
+
+/// Appends the items of the tree that the finished map does not hide.
+void CullMap::find(const BoxTree& tree, const Eye& eye, Scratch& scratch,
+                   std::vector<std::uint32_t>& found, Stats& stats) const {
+  if (tree.nodes.empty()) return;
+  if (!orthographic_) {
+    find_visible(tree, 0, eye.single, eye.floors.undersides, scratch.polar, found, stats.polar);
+    return;
+  }
+  std::vector<std::uint32_t> stack{0};
+  while (!stack.empty()) {
+    const BoxTree::Node& node = tree.nodes[stack.back()];
+    stack.pop_back();
+    for (std::uint32_t c = 0; c < node.count; ++c) {
+      if (hidden_orthographic(node, c, eye, scratch, true)) continue;
+      if ((node.child[c] & BoxTree::kItem) != 0) {
+        found.push_back(node.child[c] & ~BoxTree::kItem);
+      } else {
+        stack.push_back(node.child[c]);
+      }
+    }
+  }
+}
+
+void CullMap::find_objects(const Eye& eye, Scratch& scratch, Stats& stats) const {
+  if (options_.threads <= 1 || orthographic_ || objects_.nodes.empty()) {
+    find(objects_, eye, scratch, scratch.visible, stats);
     return;
   }
   // The tree's upper levels alone, then each subtree as a task: the same tests as in one thread.
@@ -257,63 +362,6 @@ void CullMap::find_polar(const Eye& eye, Scratch& scratch, Stats& stats) const {
   for (std::size_t i = 0; i < roots.size(); ++i) {
     scratch.visible.insert(scratch.visible.end(), found[i].begin(), found[i].end());
     stats.polar.nodes_tested += counts[i].nodes_tested;
-  }
-}
-
-void CullMap::find_orthographic(const Eye& eye, Scratch& scratch) const {
-  const OrthographicMap& map = *orthographic_;
-  auto& heights = scratch.heights;
-  map.clear(heights);
-  const auto hidden = [&](const BoxTree::Node& node, std::uint32_t c, bool finished) {
-    const double top = static_cast<double>(node.hi_y[c]) - eye.apex.y;
-    return map.hides(heights,
-                     {static_cast<double>(node.lo_x[c]), static_cast<double>(node.lo_z[c])},
-                     {static_cast<double>(node.hi_x[c]), static_cast<double>(node.hi_z[c])},
-                     static_cast<float>(top + 1e-6 * std::abs(top)), finished);
-  };
-  // Solids near first, skipping what is in shadow already.
-  std::vector<std::uint32_t> order = largest_solids(eye);
-  if (order.empty()) {
-    struct Near {
-      double distance;
-      const BoxTree::Node* node;
-      std::uint32_t child;
-    };
-    std::vector<Near> all;
-    for (const BoxTree::Node& node : walls_.tree.nodes)
-      for (std::uint32_t c = 0; c < node.count; ++c) {
-        if ((node.child[c] & BoxTree::kItem) == 0) continue;
-        const double dx = std::max({static_cast<double>(node.lo_x[c]) - eye.apex.x,
-                                    eye.apex.x - static_cast<double>(node.hi_x[c]), 0.0});
-        const double dz = std::max({static_cast<double>(node.lo_z[c]) - eye.apex.z,
-                                    eye.apex.z - static_cast<double>(node.hi_z[c]), 0.0});
-        all.push_back({std::max(dx, dz), &node, c});
-      }
-    std::sort(all.begin(), all.end(), [](const Near& a, const Near& b) {
-      return a.distance != b.distance ? a.distance < b.distance
-                                      : a.node->child[a.child] < b.node->child[b.child];
-    });
-    for (const Near& n : all)
-      if (!hidden(*n.node, n.child, false))
-        draw_orthographic(n.node->child[n.child] & ~BoxTree::kItem, eye, scratch);
-  } else {
-    for (const std::uint32_t s : order)
-      draw_orthographic(s, eye, scratch);
-  }
-  map.finish(heights);
-  if (objects_.nodes.empty()) return;
-  std::vector<std::uint32_t> stack{0};
-  while (!stack.empty()) {
-    const BoxTree::Node& node = objects_.nodes[stack.back()];
-    stack.pop_back();
-    for (std::uint32_t c = 0; c < node.count; ++c) {
-      if (hidden(node, c, true)) continue;
-      if ((node.child[c] & BoxTree::kItem) != 0) {
-        scratch.visible.push_back(node.child[c] & ~BoxTree::kItem);
-      } else {
-        stack.push_back(node.child[c]);
-      }
-    }
   }
 }
 

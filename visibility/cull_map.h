@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "visibility/box_tree.h"
@@ -40,6 +41,7 @@ class CullMap : public Method {
   /// ground only the rectangle is known here, not the heights, and such viewpoints do not count
   /// (docs/theory.md, 1).
   Result<Pvs> solve(const ViewCell& cell) const override;
+  Result<Pvs> solve(const ViewCell& cell, LastShown& last) const override;
   Result<Pvs> solve(const ViewCell& cell, Stats& stats) const;
 
   static MethodTraits make_traits();
@@ -48,10 +50,21 @@ class CullMap : public Method {
   struct Scratch;
   struct Eye;
 
-  std::vector<std::uint32_t> largest_solids(const Eye& eye) const;
-  void find_polar(const Eye& eye, Scratch& scratch, Stats& stats) const;
-  void find_orthographic(const Eye& eye, Scratch& scratch) const;
+  /// Solids to draw, in this order; nothing given: all that show.
+  using Chosen = std::optional<std::vector<std::uint32_t>>;
+
+  Result<Pvs> solve(const ViewCell& cell, LastShown* last, Stats& stats) const;
+  Chosen largest_solids(const Eye& eye, const std::vector<std::uint32_t>* among) const;
+  void draw_selected(const Eye& eye, LastShown* last, Scratch& scratch, Stats& stats) const;
+  void draw(const Eye& eye, const Chosen& chosen, Scratch& scratch, Stats& stats) const;
+  void draw_polar(const Eye& eye, const Chosen& chosen, Scratch& scratch, Stats& stats) const;
+  void draw_orthographic(const Eye& eye, const Chosen& chosen, Scratch& scratch) const;
   void draw_orthographic(std::uint32_t solid, const Eye& eye, Scratch& scratch) const;
+  bool hidden_orthographic(const BoxTree::Node& node, std::uint32_t c, const Eye& eye,
+                           const Scratch& scratch, bool finished) const;
+  void find(const BoxTree& tree, const Eye& eye, Scratch& scratch,
+            std::vector<std::uint32_t>& found, Stats& stats) const;
+  void find_objects(const Eye& eye, Scratch& scratch, Stats& stats) const;
   std::unique_ptr<Scratch> take_scratch() const;
   void give_back(std::unique_ptr<Scratch> scratch) const;
 

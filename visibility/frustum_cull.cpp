@@ -15,7 +15,14 @@ class FrustumCull final : public Method {
   Backend backend() const override { return method_->backend(); }
 
   Result<Pvs> solve(const ViewCell& cell) const override {
-    auto pvs = method_->solve(cell);
+    return culled(method_->solve(cell), cell);
+  }
+  Result<Pvs> solve(const ViewCell& cell, LastShown& last) const override {
+    return culled(method_->solve(cell, last), cell);
+  }
+
+ private:
+  Result<Pvs> culled(Result<Pvs> pvs, const ViewCell& cell) const {
     if (!pvs || !pvs->everything_because.empty()) return pvs;
     const FrustumSweep sweep(frustum_, cell, slack_m_);
     std::erase_if(pvs->objects, [&](ObjectId id) {
@@ -25,7 +32,6 @@ class FrustumCull final : public Method {
     return pvs;
   }
 
- private:
   std::unique_ptr<Method> method_;
   const Scene& scene_;
   Frustum frustum_;

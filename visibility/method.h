@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -39,6 +40,21 @@ enum class Backend {
 
 const char* to_string(Backend b);  ///< "auto", "cpu", "gl"
 
+/// Which occluders the maps draw (Wonka, Wimmer, Sillion 2001, section 5.2). All err to visible.
+enum class Selection {
+  kConservative,  ///< all; those that nearer ones hide are passed over
+  kTemporal,      ///< those that showed at the observer's last solve: a new one hides only the next
+                  ///< time
+  kTwoPass,       ///< those that show past the ones that showed at the last solve: as kConservative
+};
+
+/// The occluders that showed at an observer's last solve, as a method numbers them. A value of the
+/// caller's, one an observer and method.
+struct LastShown {
+  bool known = false;
+  std::vector<std::uint32_t> occluders;
+};
+
 class Method;
 struct MethodOptions;
 /// Makes the OpenGL occlusion map: hardware only for Backend::kAuto. Errors: kUnsupported, saying
@@ -53,6 +69,8 @@ struct MethodOptions {
   /// Draw only so many occluders, those of largest projected area first; 0: all that are not
   /// hidden.
   std::size_t max_occluders = 0;
+  /// Needs solves that are told of the observer's last one; others draw all. On the CPU only.
+  Selection selection = Selection::kConservative;
   /// Occlusion map: pixels a side of each of its six faces, a multiple of 16 from 64 to 4096. 0:
   /// 512, or 1024 for reaches below half a metre, which a pixel's margin would add much to.
   std::uint32_t map_pixels = 0;
@@ -78,6 +96,9 @@ class Method {
   /// Guarantee: traits().guarantee. Errors: kInvalidArgument if the cell's reach is larger than the
   /// occluders were shrunk for, or the eye is not finite.
   virtual Result<Pvs> solve(const ViewCell& cell) const = 0;
+  /// The same for an observer whose last solve left `last`, which is brought up to date: what
+  /// MethodOptions::selection goes by. Threads: reentrant, but not with one `last`.
+  virtual Result<Pvs> solve(const ViewCell& cell, LastShown& last) const;
 };
 
 /// Traits of every registered method.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
@@ -97,10 +98,19 @@ void OcclusionMap::give_back(std::unique_ptr<Scratch> scratch) const {
 
 Result<Pvs> OcclusionMap::solve(const ViewCell& cell) const {
   Stats stats;
-  return solve(cell, stats);
+  return solve(cell, nullptr, stats);
+}
+
+Result<Pvs> OcclusionMap::solve(const ViewCell& cell, LastShown& last) const {
+  Stats stats;
+  return solve(cell, &last, stats);
 }
 
 Result<Pvs> OcclusionMap::solve(const ViewCell& cell, Stats& stats) const {
+  return solve(cell, nullptr, stats);
+}
+
+Result<Pvs> OcclusionMap::solve(const ViewCell& cell, LastShown* last, Stats& stats) const {
   if (auto s = check_cell(cell, occluders_); !s) return s.error();
   Pvs pvs = empty_answer(scene_, cell);
   Cell c{make_map_cell(cell, frame_, occluders_), 0};
@@ -119,21 +129,50 @@ Result<Pvs> OcclusionMap::solve(const ViewCell& cell, Stats& stats) const {
   }
   c.sides = scratch->cube.look_at(lo, hi);
   scratch->visible.clear();
-  draw(c, *scratch, stats);
+  draw_selected(c, last, *scratch, stats);
   find(c, *scratch, stats);
   list_ascending(scene_.objects.size(), scratch->visible, always_visible_, scratch->bits, pvs);
   give_back(std::move(scratch));
   return pvs;
 }
 
+/// What MethodOptions::selection says. Drawing less is always safe.
+void OcclusionMap::draw_selected(const Cell& cell, LastShown* last, Scratch& scratch,
+                                 Stats& stats) const {
+  if (last == nullptr || options_.selection == Selection::kConservative) {
+    draw_all(cell, scratch, stats);
+    return;
+  }
+  if (last->known)
+    draw_these(last->occluders, cell, scratch, stats);
+  else
+    draw_all(cell, scratch, stats);
+  last->occluders.clear();
+  if (!pieces_.tree.nodes.empty())
+    find_visible(pieces_.tree, 0, cell.single, scratch.cube, last->occluders, stats);
+  if (last->known && options_.selection == Selection::kTwoPass) {
+    scratch.cube.clear();
+    draw_these(last->occluders, cell, scratch, stats);
+  }
+  last->known = true;
+}
+
+void OcclusionMap::draw_these(std::span<const std::uint32_t> pieces, const Cell& cell,
+                              Scratch& scratch, Stats& stats) const {
+  const std::size_t most = options_.max_occluders > 0 ? options_.max_occluders : pieces.size();
+  for (const std::uint32_t p : largest_pieces(pieces_, cell.eye, most, pieces))
+    draw_piece(pieces_.pieces[p], cell.sides, cell, scratch, stats);
+}
+
 /// Near pieces first; whole branches that what is drawn hides are passed over, which is always
 /// safe.
-void OcclusionMap::draw(const Cell& cell, Scratch& scratch, Stats& stats) const {
+void OcclusionMap::draw_all(const Cell& cell, Scratch& scratch, Stats& stats) const {
   const BoxTree& tree = pieces_.tree;
   if (tree.nodes.empty()) return;
   if (options_.max_occluders > 0 && options_.max_occluders < pieces_.pieces.size()) {
-    for (const std::uint32_t p : largest_pieces(pieces_, cell.eye, options_.max_occluders))
-      draw_piece(pieces_.pieces[p], cell.sides, cell, scratch, stats);
+    std::vector<std::uint32_t> all(pieces_.pieces.size());
+    std::iota(all.begin(), all.end(), 0U);
+    draw_these(all, cell, scratch, stats);
     return;
   }
   auto& queue = scratch.queue;

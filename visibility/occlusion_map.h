@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <mutex>
+#include <span>
 #include <vector>
 
 #include "visibility/box_tree.h"
@@ -34,6 +35,7 @@ class OcclusionMap : public Method {
   ~OcclusionMap() override;
   const MethodTraits& traits() const override;
   Result<Pvs> solve(const ViewCell& cell) const override;
+  Result<Pvs> solve(const ViewCell& cell, LastShown& last) const override;
   Result<Pvs> solve(const ViewCell& cell, Stats& stats) const;
 
   static MethodTraits make_traits();
@@ -42,7 +44,11 @@ class OcclusionMap : public Method {
   struct Scratch;
   struct Cell;
 
-  void draw(const Cell& cell, Scratch& scratch, Stats& stats) const;
+  Result<Pvs> solve(const ViewCell& cell, LastShown* last, Stats& stats) const;
+  void draw_all(const Cell& cell, Scratch& scratch, Stats& stats) const;
+  void draw_these(std::span<const std::uint32_t> pieces, const Cell& cell, Scratch& scratch,
+                  Stats& stats) const;
+  void draw_selected(const Cell& cell, LastShown* last, Scratch& scratch, Stats& stats) const;
   void draw_piece(const OccluderPieces::Piece& piece, std::uint32_t sides, const Cell& cell,
                   Scratch& scratch, Stats& stats) const;
   void keep_seen(const Cell& cell, const Scratch& scratch, std::vector<std::uint32_t>& found,

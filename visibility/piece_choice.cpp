@@ -84,14 +84,14 @@ PieceChoice choose_level(const OccluderPieces& pieces, const OccluderPieces::Pie
 }
 
 std::vector<std::uint32_t> largest_pieces(const OccluderPieces& pieces, const Vec3& eye,
-                                          std::size_t most) {
+                                          std::size_t most, std::span<const std::uint32_t> among) {
   struct Candidate {
     double area;
     double distance;
     std::uint32_t piece;
   };
   std::vector<Candidate> all;
-  for (std::uint32_t p = 0; p < pieces.pieces.size(); ++p) {
+  for (const std::uint32_t p : among) {
     const OccluderPieces::Piece& piece = pieces.pieces[p];
     const Vec3 size = Vec3(piece.hi) - Vec3(piece.lo);
     Vec3 gap{0};

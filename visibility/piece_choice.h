@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/view_cell.h"
@@ -57,8 +58,8 @@ PieceChoice choose_level(const OccluderPieces& pieces, const OccluderPieces::Pie
                          const MapCell& cell, const SampleMargin& margin, std::uint32_t sides,
                          const OcclusionGuards& guards = {});
 
-/// The `most` pieces of largest projected area, near ones first.
+/// The `most` pieces of largest projected area among `among`, near ones first.
 std::vector<std::uint32_t> largest_pieces(const OccluderPieces& pieces, const Vec3& eye,
-                                          std::size_t most);
+                                          std::size_t most, std::span<const std::uint32_t> among);
 
 }  // namespace ivis

@@ -291,6 +291,91 @@ TEST(MethodContractCell, ThreadsDoNotChangeTheAnswer) {
   }
 }
 
+/// Sets along the city's walk, and how many of them list something that rays show was culled.
+struct Walked {
+  std::vector<std::vector<ObjectId>> sets;
+  std::size_t misses = 0;
+};
+
+Walked walked(Way way, Selection selection, std::size_t most, const ContractScene& city,
+              const OccluderSet& set, const Reach& reach) {
+  way.options.selection = selection;
+  way.options.max_occluders = most;
+  const auto method = made(way, city.scene, set);
+  const Verifier verifier(city.scene, &set, BlockerChoice::kOccluding);
+  Walked out;
+  LastShown last;
+  for (const Vec3& eye : city.eyes) {
+    const auto pvs = method->solve({eye, reach}, last);
+    EXPECT_TRUE(pvs);
+    if (!pvs) continue;
+    out.sets.push_back(pvs->objects);
+    out.misses += misses(verifier, *pvs, 16);
+  }
+  EXPECT_EQ(last.known, selection != Selection::kConservative);
+  return out;
+}
+
+TEST(MethodContractSelection, EveryPolicyListsWhatIsSeenAndTwoPassesLoseNothing) {
+  const ContractScene city = test::small_city();
+  const Reach reach = Reach::cylinder(1, 0.1);
+  const OccluderSet set = shrunk(city.scene, reach);
+  const auto total = [](const Walked& w) {
+    std::size_t n = 0;
+    for (const auto& s : w.sets)
+      n += s.size();
+    return n;
+  };
+  for (const Way& way : ways()) {
+    if (!way.traits.needs_occluders) continue;
+    SCOPED_TRACE(way.name());
+    const Walked all = walked(way, Selection::kConservative, 0, city, set, reach);
+    const Walked temporal = walked(way, Selection::kTemporal, 0, city, set, reach);
+    const Walked twice = walked(way, Selection::kTwoPass, 0, city, set, reach);
+    const Walked few = walked(way, Selection::kTwoPass, 3, city, set, reach);
+    for (const Walked* w : {&all, &temporal, &twice, &few})
+      EXPECT_EQ(w->misses, 0U);
+    // What the second pass leaves out is hidden by what it draws: next to nothing is lost.
+    EXPECT_LE(total(twice), total(all) * 101 / 100);
+    EXPECT_GE(total(temporal), total(all));
+    EXPECT_GT(total(few), total(all));
+    // Poses are 20 apart: what showed there is not what hides here.
+    EXPECT_NE(temporal.sets, all.sets);
+    EXPECT_EQ(temporal.sets.front(), all.sets.front()) << "nothing is known before the first";
+  }
+}
+
+TEST(MethodContractSelection, WhatShowedAtTheLastPoseIsAllThatIsDrawn) {
+  // Seen from the first eye, one wall hides the other; from the second, the other alone hides.
+  SceneBuilder b;
+  b.add_box({10, 0, -20}, {12, 10, 20});
+  b.add_box({30, 0, -20}, {32, 9, 20});
+  b.add_box({39.5, 1, -0.5}, {40.5, 2, 0.5}, OccluderTag::kNever);
+  const Scene scene = std::move(b).finish();
+  const Reach reach = Reach::disc(0.5);
+  const OccluderSet set = shrunk(scene, reach);
+  for (const char* name : {"cull-map", "occlusion-map"})
+    for (const Selection selection : {Selection::kTemporal, Selection::kTwoPass}) {
+      MethodOptions options;
+      options.selection = selection;
+      const auto method = make_method(name, scene, set, options);
+      ASSERT_TRUE(method);
+      LastShown last;
+      const auto listed = [&](double x) {
+        const auto pvs = (*method)->solve({{x, 1.7, 0}, reach}, last);
+        EXPECT_TRUE(pvs);
+        return !pvs || lists(*pvs, 2);
+      };
+      EXPECT_FALSE(listed(0));
+      const std::size_t shown = last.occluders.size();
+      EXPECT_EQ(listed(20), selection == Selection::kTemporal)
+          << name << ": the far wall did not show before";
+      EXPECT_GT(last.occluders.size(), 0U);
+      EXPECT_FALSE(listed(21)) << name << ": but it did now";
+      EXPECT_GT(shown, 0U);
+    }
+}
+
 TEST(MethodContractCell, OccludersOfAnotherSceneAreRefusedByWhoeverNeedsThem) {
   const auto scenes = test::analytic_scenes();
   const OccluderSet set = shrunk(scenes[0].scene, Reach::disc(1));

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -360,7 +361,9 @@ void GlOcclusionMap::choose(const MapCell& cell, Stats& stats) const {
     }
   };
   if (options_.max_occluders > 0 && options_.max_occluders < pieces_.pieces.size()) {
-    for (const std::uint32_t p : largest_pieces(pieces_, cell.eye, options_.max_occluders))
+    std::vector<std::uint32_t> all(pieces_.pieces.size());
+    std::iota(all.begin(), all.end(), 0U);
+    for (const std::uint32_t p : largest_pieces(pieces_, cell.eye, options_.max_occluders, all))
       add(pieces_.pieces[p]);
   } else {
     for (const OccluderPieces::Piece& piece : pieces_.pieces)
