@@ -12,7 +12,9 @@
 namespace ivis {
 namespace {
 
-constexpr std::size_t kMostPlanes = 6;
+// What is larger is no face of a solid, and would take long.
+constexpr std::size_t kMostTriangles = 2000;
+constexpr std::size_t kMostSolids = 500;
 constexpr double kThinM = 1e-5;      ///< triangles lower than this have no normal to speak of
 constexpr double kMostBandM = 1e-4;  ///< and no more than four float32 steps
 constexpr double kRoundM = 1e-9;     ///< of products of coordinates in double
@@ -29,8 +31,7 @@ double band_of(const Aabb& box) {
 
 /// Triangles of one plane.
 struct Facet {
-  Vec3 normal{0};
-  double area = 0;  ///< of the largest, whose normal it is
+  Vec3 normal{0};  ///< of the largest
   std::vector<Triangle> triangles;
 };
 
@@ -61,11 +62,40 @@ std::optional<std::vector<Facet>> facets_of(const Scene& scene, const Object& ob
     }
     const double longest =
         std::max({glm::length(t.b - t.a), glm::length(t.c - t.b), glm::length(t.a - t.c)});
-    if (!(twice_area(t) > kThinM * longest) || facets.size() == kMostPlanes) return {};
-    facets.push_back({glm::normalize(glm::cross(t.b - t.a, t.c - t.a)), twice_area(t) / 2, {t}});
+    if (!(twice_area(t) > kThinM * longest) || facets.size() == kMostPlanesBehind) return {};
+    facets.push_back({glm::normalize(glm::cross(t.b - t.a, t.c - t.a)), {t}});
   }
   if (facets.empty()) return {};
   return facets;
+}
+
+/// What is matter in the plane, at every height that the facet's corners are at. A solid counts
+/// that goes on below: matter on the other side may come over the plane by rounding.
+std::vector<Ring> matter_at(const PlaneSections& sections, const PlaneFrame& highest,
+                            const PlaneFrame& lowest, const PlaneFrame& below, const Aabb& place,
+                            const Box2& box) {
+  std::vector<Ring> matter;
+  const auto cuts = sections.cuts_at(highest, place);
+  const auto deep = sections.cuts_at(below, place);
+  if (cuts.size() > kMostSolids || deep.size() > kMostSolids) return {};
+  double seam = 0;
+  for (const PlaneSections::Cut& cut : cuts) {
+    const auto goes_on = std::ranges::lower_bound(deep, cut.solid, {}, &PlaneSections::Cut::solid);
+    if (goes_on == deep.end() || goes_on->solid != cut.solid) continue;
+    std::vector<Ring> rings;
+    sections.collect({*goes_on}, below, box, rings, seam);
+    if (rings.empty()) continue;
+    rings.clear();
+    sections.collect({cut}, highest, box, rings, seam);
+    if (rings.empty()) continue;
+    // What is in a convex solid at both heights is in it between them.
+    std::vector<Ring> low;
+    sections.collect({cut}, lowest, box, low, seam);
+    if (low.empty()) continue;
+    for (const Polygon& both : intersect(rings, Fill::kNonZero, low[0]))
+      matter.push_back(both.rings[0]);
+  }
+  return matter;
 }
 
 /// Does all of the facet lie flush against matter on the side that `normal` points away from? The
@@ -86,39 +116,28 @@ std::optional<double> backed(const Facet& facet, const Vec3& normal,
     return frame_at(normal, centre + normal * (offset - glm::dot(normal, centre)));
   };
   // Through the highest corner: matter that ended below one would leave a gap to look through.
-  const PlaneFrame frame = frame_of(highest - kRoundM);
-  const PlaneFrame below = frame_of(lowest - kDeepM);
+  const PlaneFrame top = frame_of(highest - kRoundM);
+  Box2 box;
+  std::vector<Ring> rings;
+  for (const Triangle& t : facet.triangles) {
+    rings.push_back({top.to_plane(t.a), top.to_plane(t.b), top.to_plane(t.c)});
+    box.add(box_of(rings.back()));
+  }
   place.lo -= Vec3{2 * kDeepM};
   place.hi += Vec3{2 * kDeepM};
-  const auto cuts = sections.cuts_at(frame, place);
-  if (cuts.empty()) return {};
-  std::vector<Ring> rings;
-  Box2 box;
-  for (const Triangle& t : facet.triangles) {
-    Ring ring{frame.to_plane(t.a), frame.to_plane(t.b), frame.to_plane(t.c)};
-    const Vec2 ab = ring[1] - ring[0];
-    const Vec2 ac = ring[2] - ring[0];
-    if (ab.x * ac.y - ab.y * ac.x < 0) std::swap(ring[1], ring[2]);
-    box.add(box_of(ring));
-    rings.push_back(std::move(ring));
-  }
-  std::vector<Ring> matter;
-  double seam = 0;
-  // Matter on the other side may come over the plane by rounding: it has to go on below.
-  for (const PlaneSections::Cut& deep : sections.cuts_at(below, place)) {
-    const auto cut = std::ranges::find(cuts, deep.solid, &PlaneSections::Cut::solid);
-    std::vector<Ring> going_on;
-    if (cut == cuts.end()) continue;
-    sections.collect({deep}, below, grown(box, 1), going_on, seam);
-    if (!going_on.empty()) sections.collect({*cut}, frame, grown(box, 1), matter, seam);
-  }
-  if (matter.empty() || !subtract(rings, Fill::kNonZero, matter).empty()) return {};
+  const std::vector<Ring> matter = matter_at(sections, top, frame_of(lowest - kRoundM),
+                                             frame_of(lowest - kDeepM), place, grown(box, 1));
+  for (const Ring& ring : rings)
+    if (!covered(ring, matter)) return {};
   return lowest;
 }
 
 std::vector<Backing> backings_of(const Scene& scene, ObjectId id, const PlaneSections& sections) {
   const Object& object = scene.objects[id];
-  if (object.always_visible) return {};
+  const std::size_t triangles = scene.mesh_of(object).triangles();
+  if (object.always_visible || triangles == 0 || triangles > kMostTriangles ||
+      !sections.any_near(object.bounds))
+    return {};
   const double band = band_of(object.bounds);
   const auto facets = facets_of(scene, object, band);
   if (!facets) return {};

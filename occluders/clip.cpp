@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <polyclipping/clipper.hpp>
 
 namespace ivis {
@@ -81,11 +82,13 @@ void collect(const cl::PolyNode& parent, const Frame& frame, std::vector<Polygon
   }
 }
 
-std::vector<Polygon> execute(cl::ClipType operation, const std::vector<Ring>& subject, Fill fill,
-                             const std::vector<Ring>& convex) {
+/// Nothing when the library refuses.
+std::optional<std::vector<Polygon>> try_execute(cl::ClipType operation,
+                                                const std::vector<Ring>& subject, Fill fill,
+                                                const std::vector<Ring>& convex) {
   std::vector<Polygon> result;
   const Frame frame(subject);
-  if (!frame.ok()) return result;
+  if (!frame.ok()) return {};
   try {
     cl::Clipper clipper;
     for (const Ring& ring : subject)
@@ -100,12 +103,18 @@ std::vector<Polygon> execute(cl::ClipType operation, const std::vector<Ring>& su
       clipper.AddPath(path, cl::ptClip, true);
     }
     cl::PolyTree tree;
-    if (!clipper.Execute(operation, tree, fill_type(fill), cl::pftNonZero)) return result;
+    if (!clipper.Execute(operation, tree, fill_type(fill), cl::pftNonZero)) return {};
     collect(tree, frame, result);
-  } catch (const std::exception&) {  // out of the library's range: nothing is always safe
-    result.clear();
+  } catch (const std::exception&) {  // out of the library's range
+    return {};
   }
   return result;
+}
+
+/// For occluders: no region is always safe.
+std::vector<Polygon> execute(cl::ClipType operation, const std::vector<Ring>& subject, Fill fill,
+                             const std::vector<Ring>& convex) {
+  return try_execute(operation, subject, fill, convex).value_or(std::vector<Polygon>{});
 }
 
 }  // namespace
@@ -121,6 +130,15 @@ std::vector<Polygon> subtract(const std::vector<Ring>& subject, Fill fill,
 
 std::vector<Polygon> intersect(const std::vector<Ring>& subject, Fill fill, const Ring& convex) {
   return execute(cl::ctIntersection, subject, fill, {convex});
+}
+
+bool covered(const Ring& ring, const std::vector<Ring>& convex) {
+  Ring on_grid = ring;
+  for (Vec2& p : on_grid)
+    p = snap(p);
+  if (convex.empty() || !(std::abs(area(Polygon{{on_grid}})) > 0)) return false;
+  const auto left = try_execute(cl::ctDifference, {ring}, Fill::kNonZero, convex);
+  return left && left->empty();
 }
 
 Ring convex_hull(std::vector<Vec2> points) {

@@ -37,6 +37,10 @@ std::vector<Polygon> subtract(const std::vector<Ring>& subject, Fill fill,
 /// The region that `subject` fills inside one convex ring. The pieces come back as from unite().
 std::vector<Polygon> intersect(const std::vector<Ring>& subject, Fill fill, const Ring& convex);
 
+/// Do the convex rings (of any winding) between them cover all of one ring? No when the library
+/// refuses, and for a ring that has no area on the grid.
+bool covered(const Ring& ring, const std::vector<Ring>& convex);
+
 /// Convex hull, positive area; empty when the points lie on a line.
 Ring convex_hull(std::vector<Vec2> points);
 

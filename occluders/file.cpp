@@ -368,7 +368,8 @@ std::string encode_occluders(const OccluderSet& set) {
     out.u32(b.object);
     out.vec(b.plane.normal);
     out.f64(b.plane.offset);
-    out.f64(b.least_sine);
+    out.f64(b.per_level);
+    out.f64(b.per_height);
   }
   out.height_field(set.height_field);
   out.u64(set.convex_solids.size());
@@ -458,12 +459,13 @@ Result<OccluderSet> decode_occluders(std::span<const std::byte> bytes, const std
     sheet.levels = in.meshes(set.sheet_radii_m.size());
     if (in.failed()) break;
   }
-  set.backings.resize(in.count("backings", 8, 0, 4 + kPointBytes + 16));
+  set.backings.resize(in.count("backings", 8, 0, 4 + kPointBytes + 24));
   for (Backing& b : set.backings) {
     b.object = in.u32("object of a backing");
     b.plane.normal = in.normal("normal of a backing");
     b.plane.offset = in.f64("offset of a backing");
-    b.least_sine = in.f64("least sine of a backing");
+    b.per_level = in.f64("ratio of a backing");
+    b.per_height = in.f64("ratio of a backing");
     if (in.failed()) break;
   }
   set.height_field = in.height_field();

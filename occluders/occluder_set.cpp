@@ -122,14 +122,17 @@ Status check_numbers(const OccluderSet& set) {
       return invalid_argument("occluders: a sheet has a number out of range");
   for (std::size_t i = 0; i < set.backings.size(); ++i) {
     const Backing& b = set.backings[i];
-    if (outside(b.plane.normal) || !in_range(b.plane.offset) ||
-        !(b.least_sine >= 0 && b.least_sine <= 1))
+    if (!(std::abs(glm::length(b.plane.normal) - 1) < 1e-9) || !in_range(b.plane.offset) ||
+        !(b.per_level >= 0 && b.per_height >= 0 && in_range(b.per_level) && in_range(b.per_height)))
       return invalid_argument("occluders: a backing has a number out of range");
     if (i > 0 && b.object < set.backings[i - 1].object)
       return invalid_argument("occluders: backing " + std::to_string(i) + ": object " +
                               std::to_string(b.object) + " after object " +
                               std::to_string(set.backings[i - 1].object) +
                               ", expected ascending ones");
+    if (i >= kMostPlanesBehind && b.object == set.backings[i - kMostPlanesBehind].object)
+      return invalid_argument("occluders: object " + std::to_string(b.object) + " has more than " +
+                              std::to_string(kMostPlanesBehind) + " backings");
   }
   return ok();
 }

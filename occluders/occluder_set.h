@@ -96,14 +96,20 @@ struct HeightField {
 };
 
 /// A plane behind which, on the side normal.x < offset, matter backs triangles of an object. An
-/// object is hidden from a cell that lies wholly on that side of all its planes, and so that every
-/// sight line to it meets the plane at an angle whose sine is at least `least_sine`
-/// (occluders/backing.h, occluders/wall_backing.h).
+/// object is hidden from a cell that lies wholly on that side of all its planes, and so far behind
+/// that no sight line to it is too oblique: at least per_level times the greatest level distance
+/// from a viewpoint of the cell to a point of the object, and per_height times the greatest
+/// difference in height; both ratios count for the whole distance where the plane is not upright
+/// (normal.y is not 0). See occluders/backing.h, occluders/wall_backing.h.
 struct Backing {
   ObjectId object = 0;
   ConvexSolid::Plane plane;
-  double least_sine = 0;  ///< 0 to 1
+  double per_level = 0;
+  double per_height = 0;
 };
+
+/// Backings of one object, at most.
+inline constexpr std::size_t kMostPlanesBehind = 6;
 
 /// Where observers may be. Kept for the record: what counted as solid depends on it.
 struct ViewSpace {

@@ -132,6 +132,11 @@ std::vector<PlaneSections::Cut> PlaneSections::cuts_at(const PlaneFrame& frame,
   return cuts;
 }
 
+bool PlaneSections::any_near(const Aabb& place) const {
+  return !tree_.all({ground(place.lo), ground(place.hi)},
+                    [&](std::uint32_t s) { return !solids_[s].solid.bounds.overlaps(place); });
+}
+
 void PlaneSections::collect(const std::vector<Cut>& cuts, const PlaneFrame& frame, const Box2& box,
                             std::vector<Ring>& rings, double& seam) const {
   for (const Cut& c : cuts) {

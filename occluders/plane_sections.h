@@ -47,7 +47,8 @@ class PlaneSections {
   void collect(const std::vector<Cut>& cuts, const PlaneFrame& frame, const Box2& box,
                std::vector<Ring>& rings, double& seam) const;
 
-  double seam_of(std::size_t solid) const { return seams_[solid]; }
+  /// May any solid touch the box?
+  bool any_near(const Aabb& place) const;
 
  private:
   const std::vector<ConvexPiece>& solids_;

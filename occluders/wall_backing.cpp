@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <optional>
 
 #include "occluders/convex.h"
@@ -13,9 +14,12 @@
 namespace ivis {
 namespace {
 
-constexpr double kMostOutM = 0.5;  ///< from the plane to the object's highest point
+constexpr double kMostOutM = 1.5;  ///< from the plane to the object's highest point
 constexpr double kInsideM = 0.005;
-constexpr double kMostSine = 0.7;  ///< of least_sine: what asks for more is hidden by maps as well
+// What is larger hangs on no wall, and would take long.
+constexpr std::size_t kMostCorners = 20'000;
+constexpr std::size_t kMostWalls = 200;
+constexpr double kMostRatio = 0.7;  ///< of per_level: what asks for more is hidden by maps as well
 
 /// A face of a solid: a side of a prism, or of a convex solid.
 struct Wall {
@@ -36,14 +40,20 @@ struct Extent {
   double high = -std::numeric_limits<double>::infinity();
 };
 
-/// How far beyond the rectangle lo..hi on every side the section goes; negative if not even so far.
-double margin_in(const Prism& prism, const PlaneFrame& frame, const Vec2& lo, const Vec2& hi) {
-  const double base = frame.origin.y;  // v is up
-  double margin = std::min(base + lo.y - prism.bottom, prism.top - base - hi.y);
+/// How far the section of a solid goes beyond an object's place, less what is kept for rounding.
+struct Margin {
+  double level = -1;
+  double height = -1;
+};
+
+/// The frame of an upright wall: u level, v up.
+Margin margin_in(const Prism& prism, const PlaneFrame& frame, const Vec2& lo, const Vec2& hi) {
+  const double base = frame.origin.y;
   const Vec2 n = ground(frame.n);
   const Vec2 u = ground(frame.u);
   const Vec2 at = ground(frame.origin);
   const double middle = (lo.x + hi.x) / 2;
+  double level = std::numeric_limits<double>::infinity();
   bool inside = false;
   for (const auto& ring : prism.footprint.rings)
     for (std::size_t i = 0; i < ring.size(); ++i) {
@@ -54,12 +64,15 @@ double margin_in(const Prism& prism, const PlaneFrame& frame, const Vec2& lo, co
       if ((da > 0) == (db > 0)) continue;
       const double x = glm::dot(u, a + (b - a) * (da / (da - db)));
       inside ^= x > middle;
-      margin = std::min(margin, x > middle ? x - hi.x : lo.x - x);
+      level = std::min(level, x > middle ? x - hi.x : lo.x - x);
     }
-  return inside ? margin : -1;
+  if (!inside) return {};
+  return {level - kInsideM,
+          std::min(base + lo.y - prism.bottom, prism.top - base - hi.y) - kInsideM};
 }
 
-double margin_in(const ConvexSolid& solid, const PlaneFrame& frame, const Vec2& lo,
+/// The same in all directions of the plane.
+Margin margin_in(const ConvexSolid& solid, const PlaneFrame& frame, const Vec2& lo,
                  const Vec2& hi) {
   double margin = std::numeric_limits<double>::infinity();
   for (const ConvexSolid::Plane& p : solid.planes) {
@@ -71,9 +84,11 @@ double margin_in(const ConvexSolid& solid, const PlaneFrame& frame, const Vec2& 
     if (length > 1e-6)
       margin = std::min(margin, (offset - most) / length);
     else if (offset <= most + 1e-6)
-      return -1;  // parallel, and before the plane
+      return {};  // parallel, and before the plane
   }
-  return margin;
+  // A disc of this radius fits, so a square of half the diagonal does.
+  margin = (margin - kInsideM) / std::numbers::sqrt2;
+  return {margin, margin};
 }
 
 class WallBacker {
@@ -84,6 +99,10 @@ class WallBacker {
       walls_.push_back(wall);
       boxes.push_back(grown(box, kMostOutM));
     };
+    for (const Prism& p : set.solids)
+      solid_bounds_.push_back(p.bounds());
+    for (const ConvexSolid& c : set.convex_solids)
+      solid_bounds_.push_back(c.bounds);
     for (std::size_t s = 0; s < set.solids.size(); ++s)
       for (const auto& ring : set.solids[s].footprint.rings)
         for (std::size_t i = 0; i < ring.size(); ++i) {
@@ -116,26 +135,39 @@ class WallBacker {
 
   std::optional<Backing> of(ObjectId id) const {
     const Object& object = scene_.objects[id];
-    if (object.always_visible || scene_.mesh_of(object).triangles() == 0) return {};
+    const Mesh& mesh = scene_.mesh_of(object);
+    if (object.always_visible || mesh.triangles() == 0 || mesh.positions.size() > kMostCorners)
+      return {};
     std::optional<Backing> best;
     std::vector<std::uint32_t> near;
     const Vec3 centre = object.bounds.centre();
     tree_.all({ground(object.bounds.lo), ground(object.bounds.hi)}, [&](std::uint32_t w) {
       // The middle of what stands out this little is this near.
       const PlaneFrame& f = walls_[w].frame;
-      if (std::abs(glm::dot(f.n, centre - f.origin)) <= kMostOutM) near.push_back(w);
+      if (std::abs(glm::dot(f.n, centre - f.origin)) <= kMostOutM &&
+          within(object.bounds, walls_[w].solid))
+        near.push_back(w);
       return true;
     });
+    if (near.size() > kMostWalls) return {};
     std::ranges::sort(near);
     for (const std::uint32_t w : near) {
       const auto backing = on(object, walls_[w]);
-      if (backing && (!best || backing->least_sine < best->least_sine)) best = backing;
+      if (backing && (!best || backing->per_level < best->per_level)) best = backing;
     }
     if (best) best->object = id;
     return best;
   }
 
  private:
+  /// The object's place is held by the solid's, all that stands out excepted.
+  bool within(const Aabb& box, std::uint32_t solid) const {
+    Aabb held = solid_bounds_[solid];
+    held.lo -= Vec3{kMostOutM};
+    held.hi += Vec3{kMostOutM};
+    return held.contains(box.lo) && held.contains(box.hi);
+  }
+
   std::optional<Backing> on(const Object& object, const Wall& wall) const {
     const Mesh& mesh = scene_.mesh_of(object);
     const PlaneFrame& face = wall.frame;
@@ -154,18 +186,18 @@ class WallBacker {
     const double h = e.high - plane;
     if (h > kMostOutM) return {};
     const PlaneFrame frame{face.origin + face.n * plane, face.u, face.v, face.n};
-    const double m =
-        (wall.solid < set_.solids.size()
-             ? margin_in(set_.solids[wall.solid], frame, e.lo, e.hi)
-             : margin_in(set_.convex_solids[wall.solid - set_.solids.size()], frame, e.lo, e.hi)) -
-        kInsideM;
-    if (!(h < kMostSine * m)) return {};
-    return Backing{0, {frame.n, glm::dot(frame.n, frame.origin)}, h / m};
+    const Margin m =
+        wall.solid < set_.solids.size()
+            ? margin_in(set_.solids[wall.solid], frame, e.lo, e.hi)
+            : margin_in(set_.convex_solids[wall.solid - set_.solids.size()], frame, e.lo, e.hi);
+    if (!(h < kMostRatio * m.level && m.height > kInsideM)) return {};
+    return Backing{0, {frame.n, glm::dot(frame.n, frame.origin)}, h / m.level, h / m.height};
   }
 
   const Scene& scene_;
   const OccluderSet& set_;
   std::vector<Wall> walls_;
+  std::vector<Aabb> solid_bounds_;
   RectTree tree_;
 };
 

@@ -66,6 +66,9 @@ Outcome draw(const DrawArgs& args) {
                             "': pictures are SVG, expected a name that ends in .svg");
   const auto reach = args.solve.parse_reach();
   if (!reach) return reach.error();
+  if (args.solve.selection != "conservative")
+    return invalid_argument("--selection " + args.solve.selection +
+                            " goes by the last pose: a picture has one only");
   const auto eye = parse_point(args.eye);
   if (!eye) return eye.error();
   if (auto s = check_output_file(args.out); !s) return s.error();

@@ -122,6 +122,9 @@ Outcome run_pvs(const PvsArgs& args) {
     if (!eye) return eye.error();
     eyes.push_back(*eye);
   }
+  if (!eyes.empty() && args.solve.selection != "conservative")
+    return invalid_argument("--selection " + args.solve.selection +
+                            " goes by the last pose: it needs --path, not --eye");
   if (!eyes.empty()) cell = cover(eyes, *reach);
   std::vector<Pose> path;
   if (eyes.empty()) {

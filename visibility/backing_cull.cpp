@@ -1,6 +1,7 @@
 #include "visibility/backing_cull.h"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <utility>
 
@@ -12,7 +13,6 @@ namespace {
 class BackingCull final : public Method {
  public:
   BackingCull(std::unique_ptr<Method> method, const Scene& scene, const OccluderSet& occluders)
-
       : method_(std::move(method)),
         scene_(scene),
         occluders_(occluders),
@@ -37,20 +37,22 @@ class BackingCull final : public Method {
   Result<Pvs> culled(Result<Pvs> pvs, const ViewCell& cell) const {
     if (!pvs || !pvs->everything_because.empty()) return pvs;
     const Reach reach = padded(cell.reach, occluders_.slack_m);
-    const double move = glm::length(reach.half_extents());
+    const Vec3 move = reach.half_extents();
     std::erase_if(pvs->objects, [&](ObjectId id) {
       const std::span<const Backing> planes(occluders_.backings.data() + first_[id],
                                             first_[id + 1] - first_[id]);
-      if (planes.empty()) return false;
+      if (planes.empty() || scene_.objects[id].always_visible) return false;
+      const Aabb& box = scene_.objects[id].bounds;
+      // No point of the object is farther from any viewpoint of the cell, in any axis.
+      const Vec3 far = glm::max(glm::abs(box.lo - cell.eye), glm::abs(box.hi - cell.eye)) + move;
+      const double level = std::sqrt(far.x * far.x + far.z * far.z);
       return std::ranges::all_of(planes, [&](const Backing& b) {
         const double behind =
             b.plane.offset - glm::dot(b.plane.normal, cell.eye) - reach.support(b.plane.normal);
         if (!(behind > 0)) return false;
-        if (b.least_sine == 0) return true;
-        // Of the farthest: no point of the object is farther from any viewpoint.
-        const Aabb& box = scene_.objects[id].bounds;
-        const Vec3 far = glm::max(glm::abs(box.lo - cell.eye), glm::abs(box.hi - cell.eye));
-        return behind >= b.least_sine * (glm::length(far) + move);
+        if (b.plane.normal.y != 0)
+          return behind >= std::max(b.per_level, b.per_height) * glm::length(far);
+        return behind >= b.per_level * level && behind >= b.per_height * far.y;
       });
     });
     return pvs;

@@ -217,7 +217,7 @@ CullMap::Chosen CullMap::largest_solids(const Eye& eye,
   std::vector<bool> wanted(walls_.solids.size(), among == nullptr);
   if (among != nullptr)
     for (const std::uint32_t s : *among)
-      wanted[s] = true;
+      if (s < wanted.size()) wanted[s] = true;  // another method's would only draw others
   std::vector<std::uint32_t> chosen;
   struct Candidate {
     double area;

@@ -92,6 +92,7 @@ std::vector<std::uint32_t> largest_pieces(const OccluderPieces& pieces, const Ve
   };
   std::vector<Candidate> all;
   for (const std::uint32_t p : among) {
+    if (p >= pieces.pieces.size()) continue;  // another method's
     const OccluderPieces::Piece& piece = pieces.pieces[p];
     const Vec3 size = Vec3(piece.hi) - Vec3(piece.lo);
     Vec3 gap{0};

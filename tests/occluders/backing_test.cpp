@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -124,29 +126,88 @@ TEST(Backing, AMoverHasNone) {
   EXPECT_THAT(backings(scene), IsEmpty());
 }
 
-TEST(Backing, RoundBodiesAndSliversHaveNone) {
-  // Seven facets of a wheel's rim, each flush with a wedge of its own would be too many.
-  Mesh rim;
+/// The rim of `n` facets of a wheel about z, each on a wedge of matter of its own.
+Scene wheel(int n) {
   SceneBuilder b;
-  for (int i = 0; i < 7; ++i) {
-    const double a = 0.3 * i;
-    const double c = 0.3 * (i + 1);
+  Mesh rim;
+  std::vector<Mesh> wedges;
+  for (int i = 0; i < n; ++i) {
+    // Whole numbers on a circle's tangents, so that corners round to themselves.
+    const Vec2 corners[] = {{8, 0}, {8, 3}, {6, 6}, {3, 8}, {-3, 8}, {-6, 6}, {-8, 3}, {-8, 0}};
+    const Vec2 p = corners[i];
+    const Vec2 q = corners[i + 1];
     const auto first = static_cast<std::uint32_t>(rim.positions.size());
-    for (const Vec3& p : {Vec3{std::cos(a), std::sin(a), 0}, Vec3{std::cos(c), std::sin(c), 0},
-                          Vec3{std::cos(c), std::sin(c), 1}, Vec3{std::cos(a), std::sin(a), 1}})
-      rim.positions.emplace_back(p);
+    for (const Vec3& c : {Vec3{p, 0}, Vec3{q, 0}, Vec3{q, 1}, Vec3{p, 1}})
+      rim.positions.emplace_back(c);
     rim.indices.insert(rim.indices.end(),
                        {first, first + 1, first + 2, first, first + 2, first + 3});
+    wedges.push_back(mesh_of({{0, 0, 0}, {p, 0}, {q, 0}, {0, 0, 1}, {p, 1}, {q, 1}},
+                             {{0, 2, 1}, {3, 4, 5}, {0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}}));
   }
-  rim.primitives = {{0, 14, true, true}};
+  rim.primitives = {{0, static_cast<std::uint32_t>(2 * n), true, true}};
   b.add_mesh(rim, OccluderTag::kNever);
-  Mesh sliver;
-  sliver.positions = {{0, 0, 0}, {1, 0, 0}, {0.5, 1e-7, 0}};
-  sliver.indices = {0, 1, 2};
-  sliver.primitives = {{0, 1, true, true}};
-  b.add_mesh(sliver, OccluderTag::kNever);
-  b.add_box({-2, -2, -1}, {2, 2, 2}, OccluderTag::kOnly);
+  for (Mesh& wedge : wedges)
+    b.add_mesh(std::move(wedge), OccluderTag::kOnly);
+  return std::move(b).finish();
+}
+
+TEST(Backing, MoreThanSixPlanesAreTooMany) {
+  EXPECT_THAT(backings(wheel(3)), SizeIs(3));
+  EXPECT_THAT(backings(wheel(7)), IsEmpty());
+}
+
+/// One object of two triangles, on matter below y = 0 over x, z from 0 to 1.
+std::vector<Backing> on_slab(const std::array<glm::vec3, 3>& second) {
+  SceneBuilder b;
+  Mesh two;
+  two.positions = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, second[0], second[1], second[2]};
+  two.indices = {0, 1, 2, 3, 4, 5};
+  two.primitives = {{0, 2, true, true}};
+  b.add_mesh(two, OccluderTag::kNever);
+  b.add_box({0, -1, 0}, {1, 0, 1}, OccluderTag::kOnly);
+  return backings(std::move(b).finish());
+}
+
+TEST(Backing, ATriangleWithoutAreaIsNotTakenForCovered) {
+  EXPECT_THAT(on_slab({{{1, 0, 1}, {1, 0, 0}, {0, 0, 1}}}), SizeIs(1));
+  EXPECT_THAT(on_slab({{{1, 0, 0}, {1000, 0, 0}, {1000, 0, 4e-7F}}}), IsEmpty());
+  EXPECT_THAT(on_slab({{{0, 0, 0}, {1, 0, 0}, {0.5F, 0, 1e-7F}}}), IsEmpty());
+}
+
+TEST(Backing, WhatThePolygonLibraryCannotTakeIsNotCovered) {
+  SceneBuilder b;
+  b.add_mesh(face(0, {-1.5e7, -1.5e7}, {1.5e7, 1.5e7}), OccluderTag::kNever);
+  b.add_box({-1, 0, 0}, {0, 1, 1}, OccluderTag::kOnly);
   EXPECT_THAT(backings(std::move(b).finish()), IsEmpty());
+}
+
+TEST(Backing, EveryTriangleHasToBeInMatterAtItsOwnHeight) {
+  // The matter tapers to nothing at x = 0; a second sheet lies 9e-5 m under its top.
+  const auto found = [](double depth) {
+    SceneBuilder b;
+    Mesh sheets;
+    for (const double y : {0.0, -depth}) {
+      const auto first = static_cast<std::uint32_t>(sheets.positions.size());
+      for (const Vec3& p :
+           {Vec3{0, y, 1000}, Vec3{10, y, 1000}, Vec3{10, y, 1010}, Vec3{0, y, 1010}})
+        sheets.positions.emplace_back(p);
+      sheets.indices.insert(sheets.indices.end(),
+                            {first, first + 1, first + 2, first, first + 2, first + 3});
+    }
+    sheets.primitives = {{0, 4, true, true}};
+    b.add_mesh(sheets, OccluderTag::kNever);
+    b.add_mesh(mesh_of({{0, 0, 1000},
+                        {10, 0, 1000},
+                        {10, -0.1, 1000},
+                        {0, 0, 1010},
+                        {10, 0, 1010},
+                        {10, -0.1, 1010}},
+                       {{0, 1, 2}, {3, 5, 4}, {0, 3, 4, 1}, {1, 4, 5, 2}, {0, 2, 5, 3}}),
+               OccluderTag::kOnly);
+    return backings(std::move(b).finish());
+  };
+  EXPECT_THAT(found(0), SizeIs(1));
+  EXPECT_THAT(found(9e-5), IsEmpty());
 }
 
 TEST(Backing, ShrinkingFindsThem) {

@@ -39,7 +39,8 @@ OccluderSet example() {
                       {{tetrahedron}, {}, {}}};
   set.sheet_radii_m = {0.5};
   set.sheets = {{{0, 0.6, 0.8}, 3.5, {square}}};
-  set.backings = {{3, {{0, 1, 0}, 2.5}, 0}, {3, {{0.6, 0, 0.8}, -1}, 0.25}, {7, {{1, 0, 0}, 0}, 1}};
+  set.backings = {
+      {3, {{0, 1, 0}, 2.5}, 0, 0}, {3, {{0.6, 0, 0.8}, -1}, 0.25, 3}, {7, {{1, 0, 0}, 0}, 1, 1}};
   set.height_field = {{-1, 2}, {0.5, 0.25}, 2, 3, {1, 2, 3, 4.5F, HeightField::kNone, 6}};
   set.convex_solids = {
       {{{{1, 0, 0}, 1}, {{-1, 0, 0}, 0}, {{0, 1, 0}, 2}, {{0, 0, 1}, 3}}, {{0, 0, 0}, {1, 2, 3}}}};
@@ -98,7 +99,8 @@ TEST(OccluderFile, RoundTripKeepsEveryBit) {
   ASSERT_EQ(set->backings.size(), 3U);
   EXPECT_EQ(set->backings[1].object, 3U);
   EXPECT_EQ(set->backings[1].plane.normal, e.backings[1].plane.normal);
-  EXPECT_EQ(set->backings[1].least_sine, 0.25);
+  EXPECT_EQ(set->backings[1].per_level, 0.25);
+  EXPECT_EQ(set->backings[1].per_height, 3);
   EXPECT_EQ(set->height_field.heights, e.height_field.heights);
   EXPECT_EQ(set->convex_solids[0].planes[3].offset, 3);
   EXPECT_EQ(set->closed_boxes[0].hi, e.closed_boxes[0].hi);
@@ -227,7 +229,9 @@ TEST(OccluderFile, RefusesPiecesThatDoNotFitTogether) {
   refused("box of a convex solid", [](OccluderSet& s) { s.convex_solids[0].bounds.lo.x = 2; });
   refused("closed box", [](OccluderSet& s) { s.closed_boxes[0].lo.y = 5; });
   refused("normal of a backing", [](OccluderSet& s) { s.backings[1].plane.normal.x = 0.5; });
-  refused("a backing has a number", [](OccluderSet& s) { s.backings[1].least_sine = 1.5; });
+  refused("object 7 has more than 6 backings",
+          [](OccluderSet& s) { s.backings.insert(s.backings.end(), 6, s.backings[2]); });
+  refused("a backing has a number", [](OccluderSet& s) { s.backings[1].per_height = -0.5; });
   refused("backing 2: object 2 after object 3", [](OccluderSet& s) { s.backings[2].object = 2; });
   refused("step of the height field", [](OccluderSet& s) { s.height_field.step.y = 0; });
   refused("cells of the height field",

@@ -1,5 +1,6 @@
 #include "occluders/wall_backing.h"
 
+#include <cmath>
 #include <random>
 
 #include <gmock/gmock.h>
@@ -41,22 +42,27 @@ TEST(WallBacking, AWindowKnowsItsWallAndHowObliqueOneMayLook) {
   EXPECT_EQ(found[0].object, 0U);
   EXPECT_NEAR(found[0].plane.normal.z, 1, 1e-12);
   EXPECT_NEAR(found[0].plane.offset, 9.975, 1e-6);
-  // The nearest edges are the ground's, 3 m below; 5 mm are kept on either count.
-  EXPECT_NEAR(found[0].least_sine, (10.05 - 9.975) / (3 - 0.005), 1e-6);
+  // 8 m to the nearer end, 3 m to the ground; 5 mm are kept on either count.
+  EXPECT_NEAR(found[0].per_level, (10.05 - 9.975) / (8 - 0.005), 1e-6);
+  EXPECT_NEAR(found[0].per_height, (10.05 - 9.975) / (3 - 0.005), 1e-6);
 }
 
 TEST(WallBacking, NearerToAnEdgeOneMayLookLessObliquely) {
   const auto found = backings(house_and({0.3, 3, 10}, {1, 4, 10.1}));
   ASSERT_THAT(found, SizeIs(1));
-  EXPECT_NEAR(found[0].least_sine, 0.105 / 0.295, 1e-5) << "but for float32 corners";
+  EXPECT_NEAR(found[0].per_level, 0.105 / 0.295, 1e-5) << "but for float32 corners";
   EXPECT_THAT(backings(house_and({0.1, 3, 10}, {1, 4, 10.1})), IsEmpty());
   EXPECT_THAT(backings(house_and({-0.1, 3, 10}, {1, 4, 10.1})), IsEmpty());
-  EXPECT_THAT(backings(house_and({5, 7, 10}, {6, 8.9, 10.1})), IsEmpty());
+  // Near the eaves it is heights that count.
+  const auto eaves = backings(house_and({5, 7, 10}, {6, 8.9, 10.1}));
+  ASSERT_THAT(eaves, SizeIs(1));
+  EXPECT_NEAR(eaves[0].per_height, 0.105 / 0.095, 1e-4);
+  EXPECT_THAT(backings(house_and({5, 7, 10}, {6, 9.01, 10.1})), IsEmpty());
 }
 
 TEST(WallBacking, WhatStandsOutFarOrFreeHasNone) {
-  EXPECT_THAT(backings(house_and({8, 3, 10}, {9, 4, 11})), IsEmpty());
-  EXPECT_THAT(backings(house_and({8, 3, 10.6}, {9, 4, 10.7})), IsEmpty());
+  EXPECT_THAT(backings(house_and({8, 3, 10}, {9, 4, 11.6})), IsEmpty());
+  EXPECT_THAT(backings(house_and({8, 3, 11.6}, {9, 4, 11.7})), IsEmpty());
   EXPECT_THAT(backings(house_and({8, 3, 5}, {9, 4, 6})), IsEmpty()) << "deep inside";
 }
 
@@ -80,27 +86,39 @@ TEST(WallBacking, AFootprintThatIsNotConvexEndsAtItsNotch) {
   const auto yard = with_window(5, 4);
   ASSERT_THAT(yard, SizeIs(1));
   EXPECT_NEAR(yard[0].plane.offset, 3.995, 1e-6);
-  // The matter goes on under the wings: 5 m to the left, not 2.
-  EXPECT_NEAR(yard[0].least_sine, 0.105 / (4 - 0.005), 1e-6) << "the ground is nearest";
+  EXPECT_NEAR(yard[0].per_level, 0.105 / (5 - 0.005), 1e-6) << "matter goes on in the wings";
   const auto wing = with_window(1, 10);
   ASSERT_THAT(wing, SizeIs(1));
-  EXPECT_NEAR(wing[0].least_sine, 0.105 / 0.995, 1e-6);
+  EXPECT_NEAR(wing[0].per_level, 0.105 / 0.995, 1e-6);
   EXPECT_THAT(with_window(2.95, 10), IsEmpty());
 }
 
 TEST(WallBacking, ASkylightHangsOnASlopingRoof) {
-  SceneBuilder b;
-  const Vec3 n = glm::normalize(Vec3{0, 4, 4});  // of the roof's side towards +z
-  Mat4 turn{1};
-  turn[0] = {1, 0, 0, 0};
-  turn[1] = {n, 0};
-  turn[2] = {glm::cross(Vec3{1, 0, 0}, n), 0};
-  turn[3] = {5, 7, 6, 1};  // halfway up
-  b.add_mesh(test::box_mesh({-0.3, -0.02, -0.3}, {0.3, 0.04, 0.3}), OccluderTag::kNever, turn);
-  b.add_mesh(test::gabled_house());
-  const auto found = backings(std::move(b).finish());
-  ASSERT_THAT(found, SizeIs(1));
-  EXPECT_GT(glm::dot(found[0].plane.normal, n), 0.9999);
+  // Eaves at 5 m, the ridge at 9 m, 4 m in: the slope is 5.66 m long, 10 m wide.
+  const Vec3 n = glm::normalize(Vec3{0, 1, 1});
+  const Vec3 down = glm::normalize(Vec3{0, -1, 1});
+  const auto found = [&](double from_ridge, double x) {
+    const Vec3 at = Vec3{0, 9, 4} + down * from_ridge;
+    Mat4 turn{1};
+    turn[1] = {n, 0};
+    turn[2] = {down, 0};
+    turn[3] = {x, at.y, at.z, 1};
+    SceneBuilder b;
+    b.add_mesh(test::box_mesh({-0.3, -0.02, -0.3}, {0.3, 0.04, 0.3}), OccluderTag::kNever, turn);
+    b.add_mesh(test::gabled_house());
+    return backings(std::move(b).finish());
+  };
+  const auto middle = found(2.5, 5);
+  ASSERT_THAT(middle, SizeIs(1));
+  EXPECT_GT(glm::dot(middle[0].plane.normal, n), 0.9999);
+  EXPECT_EQ(middle[0].per_level, middle[0].per_height);
+  // The two sides of the roof meet at a right angle: the plane in it goes as far as the roof.
+  const double room = 2.5 - 0.3;
+  EXPECT_NEAR(middle[0].per_level, 0.065 / ((room - 0.005) / std::sqrt(2.0)), 1e-4);
+  const auto gable = found(2.5, 0.8);
+  ASSERT_THAT(gable, SizeIs(1));
+  EXPECT_NEAR(gable[0].per_level, 0.065 / (0.495 / std::sqrt(2.0)), 1e-4);
+  EXPECT_THAT(found(0.4, 5), IsEmpty()) << "too near the ridge";
 }
 
 TEST(WallBacking, EverySightLineTheRuleAllowsComesThroughTheHouse) {
@@ -123,7 +141,8 @@ TEST(WallBacking, EverySightLineTheRuleAllowsComesThroughTheHouse) {
     const Vec3 x = y + (q - y) * ((glm::dot(b.plane.normal, y) - b.plane.offset) /
                                   glm::dot(b.plane.normal, y - q));
     const bool through = x.x > 0 && x.x < 20 && x.y > 0 && x.y < 9;
-    if (behind >= b.least_sine * glm::length(y - q)) {
+    if (behind >= b.per_level * std::hypot(y.x - q.x, y.z - q.z) &&
+        behind >= b.per_height * std::abs(y.y - q.y)) {
       ++allowed;
       ASSERT_TRUE(through) << "from " << q.x << ',' << q.y << ',' << q.z;
     } else {

@@ -55,6 +55,8 @@ TEST(ToolRefuses, UsageErrorsWithCodeTwo) {
                  "--max-occluders");
   expect_refused({"pvs", t.scene, "--eye", eye, "--reach", "disc:1", "--selection", "some"}, 2,
                  "some");
+  expect_refused({"pvs", t.scene, "--eye", eye, "--reach", "disc:1", "--selection", "temporal"}, 2,
+                 "needs --path");
   for (const std::string bad :
        {"90,0,90,60", "0,0,0,60,5", "0,0,90,180,5", "0,95,90,60,5", "a,0,90,60,5"})
     expect_refused({"pvs", t.scene, "--eye", eye, "--reach", "disc:1", "--frustum", bad}, 2, bad);

@@ -226,6 +226,9 @@ TEST(MethodContractCell, ADrawnFaceIsListedUnlessAllOfTheCellIsBehindIt) {
     EXPECT_FALSE(listed(1.4)) << way.name();
     EXPECT_FALSE(listed(-5)) << way.name();
   }
+  OccluderSet bent = set;
+  bent.backings[0].plane.normal *= 0.5;
+  EXPECT_FALSE(make_method("cull-map", scene, bent));
   OccluderSet other = set;
   ASSERT_EQ(other.backings.size(), 1U);
   other.backings[0].object = 2;
@@ -494,7 +497,7 @@ TEST(VerifierPower, FindsThatThingsOnWallsAreTakenForHiddenAtAGraze) {
   for (const bool guarded : {true, false}) {
     if (!guarded)
       for (Backing& wall : set.backings)
-        wall.least_sine = 0;
+        wall.per_level = wall.per_height = 0;
     const auto method = make_method("cull-map", scene, set);
     ASSERT_TRUE(method);
     const auto pvs = (*method)->solve(along);
