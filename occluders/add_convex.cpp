@@ -13,17 +13,8 @@ namespace ivis {
 namespace {
 
 bool taken_whole(const ObjectSolids& found) {
-  if (!found.left_out.empty() || found.prisms.empty()) return false;
-  double volume = 0;
-  double below = 0;
-  for (std::size_t i = 0; i < found.prisms.size(); ++i) {
-    const Prism& p = found.prisms[i];
-    // Nested prisms of one piece stand on one base.
-    const bool nested = i > 0 && p.bottom == found.prisms[i - 1].bottom && p.top > below;
-    volume += area(p.footprint) * (p.top - (nested ? below : p.bottom));
-    below = p.top;
-  }
-  return volume >= found.volume * (1 - 1e-6);
+  return found.left_out.empty() && !found.prisms.empty() &&
+         volume_taken(found) >= found.volume * (1 - 1e-6);
 }
 
 // In towns what is convex is mostly a prism and thick, and hides better as a solid. In rooms walls

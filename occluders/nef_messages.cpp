@@ -47,6 +47,7 @@ class Words {
     return all;
   }
   double number() {
+    if (!good()) return 0;
     const std::string_view word = next();
     double v = 0;
     if (word.empty()) short_ = true;
@@ -77,6 +78,7 @@ class Words {
 
  private:
   std::size_t integer() {
+    if (!good()) return 0;
     const std::string_view word = next();
     std::size_t n = 0;
     if (word.empty()) short_ = true;
@@ -166,7 +168,9 @@ std::string encode_level(const FaceMesh& mesh) {
 }
 
 std::string encode_trouble(std::string_view why) {
-  return "trouble " + std::string(why);
+  std::string words(why.substr(0, 160));  // of several lines, with the files of whoever says it
+  std::replace(words.begin(), words.end(), '\n', ' ');
+  return "trouble " + words;
 }
 
 std::string encode_end() {

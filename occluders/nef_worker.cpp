@@ -21,6 +21,7 @@ extern char** environ;
 namespace ivis {
 namespace {
 
+constexpr double kRoundM = 1e-6;  ///< what exact numbers may lose as doubles, and much more
 constexpr std::size_t kMostAnswerBytes = std::size_t{64} << 20U;
 
 /// Closes itself.
@@ -132,7 +133,7 @@ Result<ShrunkPolyhedron> shrink_polyhedron(const std::filesystem::path& worker,
                                            const Polyhedron& solid, const Vec3& half,
                                            std::span<const double> margins_m, double seconds,
                                            const Context& context) {
-  const NefRequest request{solid, half, {margins_m.begin(), margins_m.end()}};
+  const NefRequest request{solid, half + Vec3{kRoundM}, {margins_m.begin(), margins_m.end()}};
   const auto text = converse(worker, encode(request), seconds, context);
   if (!text) return text.error();
   auto answer = decode_nef_answer(*text);

@@ -264,4 +264,17 @@ ObjectSolids extract_prisms(const Scene& scene, const Object& object) {
   return out;
 }
 
+double volume_taken(const ObjectSolids& found) {
+  double volume = 0;
+  double below = 0;
+  for (std::size_t i = 0; i < found.prisms.size(); ++i) {
+    const Prism& p = found.prisms[i];
+    // Nested prisms of one piece stand on one base.
+    const bool nested = i > 0 && p.bottom == found.prisms[i - 1].bottom && p.top > below;
+    volume += area(p.footprint) * (p.top - (nested ? below : p.bottom));
+    below = p.top;
+  }
+  return volume;
+}
+
 }  // namespace ivis

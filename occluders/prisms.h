@@ -33,4 +33,7 @@ inline constexpr std::size_t kMaxLevelsPerPiece = 3;
 /// winding.
 ObjectSolids extract_prisms(const Scene& scene, const Object& object);
 
+/// Cubic metres that the prisms fill.
+double volume_taken(const ObjectSolids& found);
+
 }  // namespace ivis

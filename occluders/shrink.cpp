@@ -6,6 +6,7 @@
 
 #include "core/view_cell.h"
 #include "occluders/add_convex.h"
+#include "occluders/add_polyhedra.h"
 #include "occluders/clip.h"
 #include "occluders/fuse.h"
 #include "occluders/gate.h"
@@ -179,6 +180,9 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
   if (Status s = add_convex_and_sheets(scene, objects, is_ground, options, context, found, set,
                                        report, fates);
       !s)
+    return s.error();
+
+  if (Status s = add_polyhedra(scene, objects, is_ground, found, options, set, report, context); !s)
     return s.error();
 
   for (std::size_t i = 0; i < found.size(); ++i) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -33,6 +34,8 @@ struct ShrinkReport {
   std::map<std::string, std::size_t> left_out;  ///< reason -> objects (or pieces)
   std::size_t convex_solids = 0;                ///< that are no upright prisms
   std::size_t convex_pieces = 0;                ///< of these, what the reach leaves
+  std::size_t polyhedra = 0;                    ///< solids that the worker was asked about
+  std::size_t polyhedra_shrunk = 0;             ///< of these, what is left
   std::size_t sheet_planes = 0;
   std::size_t sheet_tiles = 0;
   std::size_t sheet_faces = 0;  ///< of all levels
@@ -48,6 +51,13 @@ struct ShrinkReport {
 /// and many of them are no upright prisms.
 enum class SheetUse : std::uint8_t { kAuto, kOff, kOn };
 
+/// Small closed solids that are neither prisms nor convex (nef_worker.h).
+struct PolyhedronOptions {
+  std::filesystem::path worker;  ///< the program ivis_nef; empty: such solids are left out
+  double seconds = 10;           ///< for each; how far a solid gets may depend on the machine
+  std::size_t most_triangles = 200;
+};
+
 struct ShrinkOptions {
   Reach reach;
   ViewSpace view_space;
@@ -56,6 +66,7 @@ struct ShrinkOptions {
   std::vector<double> margins_m{};  ///< empty: default_margins() of the reach
   SheetUse sheets = SheetUse::kAuto;
   bool fates = false;  ///< also tell what became of each object
+  PolyhedronOptions polyhedra;
   double voxel_m = 0;  ///< side of the voxels of general solids (voxel_solids.h); 0: none
 };
 

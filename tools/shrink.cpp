@@ -8,6 +8,7 @@
 #endif
 #include "occluders/fast_erosion.h"
 #include "occluders/file.h"
+#include "occluders/nef_worker.h"
 #include "tools/common.h"
 #include "tools/shrink_report.h"
 
@@ -23,6 +24,7 @@ struct ShrinkArgs {
   std::filesystem::path report;
   unsigned threads = 0;
   double voxel_m = 0;
+  double polyhedron_s = 0;
   bool json = false;
 };
 
@@ -52,6 +54,14 @@ Outcome run_shrink(const ShrinkArgs& args) {
   options.view_space = *space;
   options.voxel_m = args.voxel_m;
   options.fates = !args.report.empty();
+  if (args.polyhedron_s > 0) {
+    options.polyhedra.worker = nef_worker_beside_this();
+    options.polyhedra.seconds = args.polyhedron_s;
+    if (options.polyhedra.worker.empty())
+      return invalid_argument(
+          "--polyhedra: there is no program ivis_nef beside this one; build it "
+          "with -DIVIS_WITH_CGAL=ON");
+  }
   auto eroder = make_eroder(args.builder);
   if (!eroder) return eroder.error();
   const auto scene = args.scene.load(context);
@@ -79,6 +89,8 @@ Outcome run_shrink(const ShrinkArgs& args) {
                {"convex_pieces", r.convex_pieces},
                {"prism_pieces", shrunk->set.prism_pieces.size()},
                {"solid_pieces", shrunk->set.solid_pieces.size()},
+               {"polyhedra", r.polyhedra},
+               {"polyhedra_shrunk", r.polyhedra_shrunk},
                {"sheet_planes", r.sheet_planes},
                {"sheet_tiles", r.sheet_tiles},
                {"sheet_faces", r.sheet_faces},
@@ -119,6 +131,9 @@ Outcome run_shrink(const ShrinkArgs& args) {
   if (r.convex_solids > 0)
     std::cout << "  " << r.convex_solids << " convex solids that are no prisms, " << r.convex_pieces
               << " of them thicker than the reach\n";
+  if (r.polyhedra > 0)
+    std::cout << "  " << r.polyhedra << " small polyhedra, " << r.polyhedra_shrunk
+              << " of them thicker than the reach\n";
   if (r.sheet_tiles > 0)
     std::cout << "  " << r.sheet_tiles << " sheets in " << r.sheet_planes << " planes, "
               << r.sheet_faces << " faces in all levels, in " << r.sheet_seconds << " s\n";
@@ -157,6 +172,12 @@ void add_shrink(CLI::App& app, std::function<Outcome()>& action) {
       ->type_name("SIZE_M")
       ->capture_default_str()
       ->check(number_within(0, 1e6));
+  sub->add_option("--polyhedra", args->polyhedron_s,
+                  "also shrink small closed solids that are neither prisms nor convex, by the "
+                  "program ivis_nef, which may work at each for so many seconds; 0: do not")
+      ->type_name("SECONDS")
+      ->capture_default_str()
+      ->check(number_within(0, 3600));
   sub->add_option("--report", args->report,
                   "also write what became of each part: DIR/report.txt (a table), report.json, "
                   "report.svg (from above)")

@@ -133,6 +133,8 @@ int main(int argc, char** argv) {
   const auto request = ivis::decode_nef_request(text);
   if (!request) give_up(request.error().message);
   CGAL::set_error_behaviour(CGAL::THROW_EXCEPTION);
+  CGAL::set_error_handler(nullptr);  // what is thrown says it
+  CGAL::set_warning_handler(nullptr);
   try {
     const Nef solid = solid_of(request->solid);
     say(ivis::encode_parts(parts_of(solid)));
@@ -153,6 +155,8 @@ int main(int argc, char** argv) {
       if (mesh.empty()) break;
     }
     say(ivis::encode_end());
+  } catch (const CGAL::Failure_exception& e) {
+    give_up("CGAL: " + e.library() + ": " + e.expression() + " " + e.message());
   } catch (const std::exception& e) {
     give_up(e.what());
   }
