@@ -1,5 +1,7 @@
 #include "occluders/add_polyhedra.h"
 
+#include <array>
+#include <map>
 #include <optional>
 
 #include "core/view_cell.h"
@@ -22,7 +24,6 @@ struct Candidate {
 std::vector<Polyhedron> candidates(const Scene& scene, const Object& object, std::size_t most) {
   std::vector<Polyhedron> found;
   if (object.tag == OccluderTag::kNever || object.always_visible) return found;
-  const auto& primitives = scene.mesh_of(object).primitives;
   const WeldedMesh mesh = weld(scene, object);
   for (const MeshPiece& piece : mesh.pieces) {
     if (!piece.closed || !piece.oriented || piece.triangles.size() > most ||
@@ -42,11 +43,6 @@ std::vector<Polyhedron> candidates(const Scene& scene, const Object& object, std
     }
     found.push_back(std::move(solid));
   }
-  // A mirrored object's mesh is wound the other way round; sidedness goes by that too.
-  const bool one_sided =
-      scene.honour_sidedness && std::any_of(primitives.begin(), primitives.end(),
-                                            [](const Primitive& p) { return !p.double_sided; });
-  if (one_sided && glm::determinant(glm::dmat3(object.to_world)) < 0) found.clear();
   return found;
 }
 

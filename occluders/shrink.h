@@ -66,7 +66,7 @@ struct ShrinkOptions {
   std::vector<double> margins_m{};  ///< empty: default_margins() of the reach
   SheetUse sheets = SheetUse::kAuto;
   bool fates = false;  ///< also tell what became of each object
-  PolyhedronOptions polyhedra;
+  PolyhedronOptions polyhedra{};
   double voxel_m = 0;  ///< side of the voxels of general solids (voxel_solids.h); 0: none
 };
 
