@@ -8,10 +8,6 @@
 
 namespace ivis {
 
-Result<Pvs> Method::solve(const ViewCell& cell, LastShown& /*last*/) const {
-  return solve(cell);
-}
-
 const char* to_string(Guarantee g) {
   switch (g) {
     case Guarantee::kConservative:

@@ -98,7 +98,7 @@ class Method {
   virtual Result<Pvs> solve(const ViewCell& cell) const = 0;
   /// The same for an observer whose last solve left `last`, which is brought up to date: what
   /// MethodOptions::selection goes by. Threads: reentrant, but not with one `last`.
-  virtual Result<Pvs> solve(const ViewCell& cell, LastShown& last) const;
+  virtual Result<Pvs> solve(const ViewCell& cell, LastShown& /*last*/) const { return solve(cell); }
 };
 
 /// Traits of every registered method.
