@@ -1,5 +1,6 @@
 #include "occluders/add_polyhedra.h"
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <optional>
@@ -24,6 +25,11 @@ struct Candidate {
 std::vector<Polyhedron> candidates(const Scene& scene, const Object& object, std::size_t most) {
   std::vector<Polyhedron> found;
   if (object.tag == OccluderTag::kNever || object.always_visible) return found;
+  // Parity is not winding: what self-crossing one-sided surfaces enclose may be entered unseen.
+  const auto& primitives = scene.mesh_of(object).primitives;
+  if (scene.honour_sidedness && std::any_of(primitives.begin(), primitives.end(),
+                                            [](const Primitive& p) { return !p.double_sided; }))
+    return found;
   const WeldedMesh mesh = weld(scene, object);
   for (const MeshPiece& piece : mesh.pieces) {
     if (!piece.closed || !piece.oriented || piece.triangles.size() > most ||
@@ -82,14 +88,15 @@ Status add_polyhedra(const Scene& scene, const std::vector<const Object*>& objec
     if (made->failed_check) ++report.left_out["polyhedron: failed distance check"];
     if (made->levels.empty() && !made->failed_check)
       ++report.left_out["polyhedron: too thin for the reach"];
+    if (made->levels.empty()) continue;  // nothing is drawn, so nobody need know of eyes in it
     for (const ConvexSolid& part : made->parts)
       for (std::size_t s = 0; s < options.view_space.seeds.size(); ++s)
-        if (contains(part, options.view_space.seeds[s]))
+        if (part.bounds.contains(options.view_space.seeds[s]) &&
+            contains(part, options.view_space.seeds[s]))
           return invalid_argument("view space seed " + std::to_string(s) +
                                   " lies inside the solid of node " +
                                   std::to_string(c.object->node));
     set.convex_solids.insert(set.convex_solids.end(), made->parts.begin(), made->parts.end());
-    if (made->levels.empty()) continue;
     ++report.polyhedra_shrunk;
     SolidPiece piece;
     piece.levels = std::move(made->levels);

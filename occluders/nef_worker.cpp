@@ -22,7 +22,7 @@ namespace ivis {
 namespace {
 
 constexpr double kRoundM = 1e-6;  ///< what exact numbers may lose as doubles, and much more
-constexpr std::size_t kMostAnswerBytes = std::size_t{64} << 20U;
+constexpr std::size_t kMostAnswerBytes = std::size_t{16} << 20U;
 
 /// Closes itself.
 struct End {
@@ -90,7 +90,9 @@ Result<std::string> converse(const std::filesystem::path& worker, std::string_vi
   posix_spawnattr_destroy(&attributes);
   if (failed != 0) {
     child.pid = -1;
-    return io_error("cannot run " + path + ": " + std::strerror(failed));
+    const std::string why = "cannot run " + path + ": " + std::strerror(failed);
+    // Want of memory or processes passes; a program that is not there stays away.
+    return failed == ENOENT || failed == EACCES ? io_error(why) : unsupported(why);
   }
   link.childs.shut();
 
@@ -139,7 +141,7 @@ Result<ShrunkPolyhedron> shrink_polyhedron(const std::filesystem::path& worker,
   auto answer = decode_nef_answer(*text);
   if (!answer) return unsupported("the worker's answer: " + answer.error().message);
   // Without the parts nobody would know that an eye is inside.
-  if (!answer->complete && (answer->levels.empty() || answer->parts.empty()))
+  if (answer->parts.empty() || (!answer->complete && answer->levels.empty()))
     return unsupported(answer->trouble.empty() ? "the worker ended, or took too long"
                                                : "the worker: " + answer->trouble);
   ShrunkPolyhedron shrunk;

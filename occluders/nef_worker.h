@@ -28,7 +28,8 @@ std::filesystem::path nef_worker_beside_this();
 /// their own, with limits on time, memory and output, and what goes wrong there costs one occluder.
 /// Units:     `half`: half-extents of a box that holds the reach, metres; the sum is with the box.
 /// Guarantee: each level lies inside the erosion by the reach (within_box_erosion).
-/// Errors:    kIo when the worker cannot be run; kUnsupported when it fails, or takes longer than
+/// Errors:    kIo when there is no such program to run; kUnsupported when it fails, or takes longer
+/// than
 ///            `seconds` for the first level, with its words; kCancelled when stopped.
 /// Threads:   reentrant.
 /// Source:    in place of the tetrahedra of Wonka, Wimmer, Sillion 2001, section 5.3: the solid

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace ivis {
 namespace {
+
+constexpr std::size_t kMostFaces = 20'000;  ///< of a shrunk solid; more would take long
 
 using Corners = std::array<Vec3, 3>;
 
@@ -40,9 +41,7 @@ bool apart(const Corners& a, const Corners& b, const Vec3& half) {
   return false;
 }
 
-/// Parity along a direction that no edge of sane data is seen along.
-bool inside(const std::vector<Corners>& surface, const Vec3& p) {
-  const Vec3 d = glm::normalize(Vec3{0.4131592, 0.7538271, 0.5110713});
+bool odd_along(const std::vector<Corners>& surface, const Vec3& p, const Vec3& d) {
   bool in = false;
   for (const Corners& t : surface) {
     const Vec3 n = glm::cross(t[1] - t[0], t[2] - t[0]);
@@ -53,9 +52,9 @@ bool inside(const std::vector<Corners>& surface, const Vec3& p) {
     const Vec3 x = p + d * at;
     bool left = true;
     bool right = true;
-    for (int i = 0; i < 3; ++i) {
-      const Vec3& from = t[static_cast<std::size_t>(i)];
-      const Vec3& to = t[static_cast<std::size_t>((i + 1) % 3)];
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vec3& from = t[i];
+      const Vec3& to = t[(i + 1) % 3];
       const double side = glm::dot(glm::cross(to - from, x - from), n);
       left = left && side >= 0;
       right = right && side <= 0;
@@ -65,10 +64,24 @@ bool inside(const std::vector<Corners>& surface, const Vec3& p) {
   return in;
 }
 
+enum class Place { kOut, kIn, kUnsure };
+
+/// Parity along three directions: one that meets an edge is outvoted by none.
+Place place(const std::vector<Corners>& surface, const Vec3& p) {
+  const Vec3 directions[3] = {glm::normalize(Vec3{0.4131592, 0.7538271, 0.5110713}),
+                              glm::normalize(Vec3{-0.6180339, 0.3247179, 0.7159217}),
+                              glm::normalize(Vec3{0.2718281, -0.5772156, 0.7700433})};
+  int in = 0;
+  for (const Vec3& d : directions)
+    in += odd_along(surface, p, d) ? 1 : 0;
+  return in == 0 ? Place::kOut : in == 3 ? Place::kIn : Place::kUnsure;
+}
+
 }  // namespace
 
 bool within_box_erosion(const FaceMesh& mesh, const Polyhedron& solid, const Vec3& half) {
-  if (mesh.empty() || !(half.x > 0 && half.y > 0 && half.z > 0)) return false;
+  if (mesh.empty() || mesh.faces.size() > kMostFaces || !(half.x > 0 && half.y > 0 && half.z > 0))
+    return false;
   std::vector<Corners> faces;
   for (const auto& f : mesh.faces)
     for (std::size_t i = 2; i < 4; ++i)
@@ -82,10 +95,10 @@ bool within_box_erosion(const FaceMesh& mesh, const Polyhedron& solid, const Vec
       if (!apart(f, s, half)) return false;
   for (const Corners& f : faces)
     for (const Vec3& p : f)
-      if (!inside(surface, p)) return false;
+      if (place(surface, p) != Place::kIn) return false;
   for (const Corners& s : surface)
     for (const Vec3& p : s)
-      if (inside(faces, p)) return false;
+      if (place(faces, p) != Place::kOut) return false;
   return true;
 }
 

@@ -182,9 +182,6 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
       !s)
     return s.error();
 
-  if (Status s = add_polyhedra(scene, objects, is_ground, found, options, set, report, context); !s)
-    return s.error();
-
   for (std::size_t i = 0; i < found.size(); ++i) {
     report.solid_volume += found[i].volume;
     for (const auto& [reason, count] : found[i].left_out)
@@ -212,6 +209,10 @@ Result<Shrunk> shrink(const Scene& scene, const ShrinkOptions& options, const Er
     set.backings.push_back(b);
   std::ranges::stable_sort(set.backings, {}, &Backing::object);
   if (context.stopped()) return cancelled();
+
+  // After the walls: the convex parts that come of it are checked by nobody, and only tell of eyes.
+  if (Status s = add_polyhedra(scene, objects, is_ground, found, options, set, report, context); !s)
+    return s.error();
 
   const std::vector<FusedStack> stacks = fuse(set.solids, set.floor, {}, context);
   if (context.stopped()) return cancelled();

@@ -74,8 +74,12 @@ Nef solid_of(const ivis::Polyhedron& mesh) {
   return Nef(poly);
 }
 
+/// To the nearest: of a number that is not worked out yet to_double() promises much less.
+double rounded(const Kernel::FT& v) {
+  return CGAL::to_double(CGAL::exact(v));
+}
 Vec3 rounded(const Point& p) {
-  return {CGAL::to_double(p.x()), CGAL::to_double(p.y()), CGAL::to_double(p.z())};
+  return {rounded(p.x()), rounded(p.y()), rounded(p.z())};
 }
 
 ivis::FaceMesh mesh_of(const Nef& nef) {
@@ -108,16 +112,25 @@ std::vector<ivis::ConvexSolid> parts_of(const Nef& nef) {
     part.bounds.lo -= Vec3{1e-6};
     part.bounds.hi += Vec3{1e-6};
     for (auto f = poly.facets_begin(); f != poly.facets_end(); ++f) {
-      const auto h = f->halfedge();
+      // Corners may lie on edges, where a neighbour's wall ends: three that do not are needed.
+      auto h = f->halfedge();
+      const auto first = h;
+      const auto straight = [&] {
+        return CGAL::collinear(h->vertex()->point(), h->next()->vertex()->point(),
+                               h->next()->next()->vertex()->point());
+      };
+      while (straight()) {
+        h = h->next();
+        if (h == first) give_up("a face without area");
+      }
       const auto n = CGAL::normal(h->vertex()->point(), h->next()->vertex()->point(),
                                   h->next()->next()->vertex()->point());
-      const Vec3 normal{CGAL::to_double(n.x()), CGAL::to_double(n.y()), CGAL::to_double(n.z())};
-      const double length = glm::length(normal);
-      if (!(length > 0)) continue;
-      part.planes.push_back(
-          {normal / length, glm::dot(normal / length, rounded(h->vertex()->point())) + 1e-6});
+      const Vec3 exact{rounded(n.x()), rounded(n.y()), rounded(n.z())};
+      const Vec3 normal = exact / glm::length(exact);
+      part.planes.push_back({normal, glm::dot(normal, rounded(h->vertex()->point())) + 1e-6});
     }
-    if (part.planes.size() >= 4) parts.push_back(std::move(part));
+    if (part.planes.size() < 4) give_up("a part without inside");
+    parts.push_back(std::move(part));
   }
   return parts;
 }
@@ -126,7 +139,7 @@ std::vector<ivis::ConvexSolid> parts_of(const Nef& nef) {
 
 int main(int argc, char** argv) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  limit(RLIMIT_AS, rlim_t{3} << 30U);
+  limit(RLIMIT_AS, rlim_t{1} << 30U);
   limit(RLIMIT_CORE, 0);
   if (argc > 1) limit(RLIMIT_CPU, static_cast<rlim_t>(std::max(1, std::atoi(argv[1]))));
   const std::string text{std::istreambuf_iterator<char>(std::cin), {}};

@@ -121,6 +121,7 @@ TEST(NefWorker, AWorkerThatFailsHangsOrLiesCostsOneOccluder) {
   ASSERT_TRUE(lies) << lies.error().message;
   EXPECT_TRUE(lies->failed_check);
   EXPECT_TRUE(lies->levels.empty());
+  EXPECT_EQ(ask(script("forgets", "echo 'parts 0 end '"), 5).error().code, ErrorCode::kUnsupported);
   std::atomic<bool> stop{true};
   Context context;
   context.stop = &stop;
@@ -130,6 +131,45 @@ TEST(NefWorker, AWorkerThatFailsHangsOrLiesCostsOneOccluder) {
                 .code,
             ErrorCode::kCancelled);
   std::filesystem::remove_all(folder);
+}
+
+TEST(NefWorker, PartsKeepTheFaceThatAFinEndsOn) {
+  // A block, 4 x 4 x 4 m, one edge of it chamfered by a metre, and a fin that stands on the
+  // chamfer's upper edge: the fin's end puts corners on that edge.
+  const Mesh block = test::mesh_of(
+      {{0, 0, 0},
+       {4, 0, 0},
+       {4, 0, 4},
+       {0, 0, 4},
+       {0, 4, 0},
+       {3, 4, 0},
+       {3, 4, 4},
+       {0, 4, 4},
+       {4, 3, 0},
+       {4, 3, 4},
+       {3, 4, 1},
+       {3, 4, 2},
+       {1, 4, 1},
+       {1, 4, 2},
+       {3, 6, 1},
+       {3, 6, 2},
+       {1, 6, 1},
+       {1, 6, 2}},
+      {{0, 1, 2, 3},     {0, 4, 5, 8, 1},  {3, 2, 9, 6, 7},  {0, 3, 7, 4},     {1, 8, 9, 2},
+       {5, 10, 8},       {10, 11, 8},      {11, 9, 8},       {11, 6, 9},       {4, 12, 5},
+       {12, 10, 5},      {4, 7, 12},       {7, 13, 12},      {7, 6, 13},       {6, 11, 13},
+       {12, 16, 14, 10}, {11, 15, 17, 13}, {13, 17, 16, 12}, {10, 14, 15, 11}, {16, 17, 15, 14}});
+  const auto made =
+      shrink_polyhedron(kWorker, polyhedron(block), {0.2, 0.2, 0.2}, std::vector<double>{0}, 60);
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_FALSE(made->failed_check);
+  const auto inside = [&](const Vec3& p) {
+    return std::ranges::any_of(made->parts, [&](const ConvexSolid& c) { return contains(c, p); });
+  };
+  EXPECT_TRUE(inside({3.4, 3.4, 3.2}));
+  EXPECT_TRUE(inside({2, 5, 1.5}));
+  for (double z = 0.1; z < 4; z += 0.3)
+    EXPECT_FALSE(inside({3.7, 3.7, z})) << "cut off by the chamfer, z = " << z;
 }
 
 TEST(NefWorker, ShrinkingATiltedEllHidesAsASolidAndKnowsItsInside) {
