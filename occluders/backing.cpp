@@ -15,18 +15,14 @@ namespace {
 // What is larger is no face of a solid, and would take long.
 constexpr std::size_t kMostTriangles = 2000;
 constexpr std::size_t kMostSolids = 500;
-constexpr double kThinM = 1e-5;      ///< triangles lower than this have no normal to speak of
-constexpr double kMostBandM = 1e-4;  ///< and no more than four float32 steps
-constexpr double kRoundM = 1e-9;     ///< of products of coordinates in double
-constexpr double kDeepM = 0.005;     ///< more than faces of one solid may be out by (kSeamM)
+constexpr double kThinM = 1e-5;   ///< triangles lower than this have no normal to speak of
+constexpr double kRoundM = 1e-9;  ///< of products of coordinates in double
+constexpr double kDeepM = 0.005;  ///< more than faces of one solid may be out by (kSeamM)
 
 /// How far the corners of one plane may be out of it: what corners of this size are rounded by, no
 /// less than the grid of clip.h can tell.
 double band_of(const Aabb& box) {
-  const Vec3 far = glm::max(glm::abs(box.lo), glm::abs(box.hi));
-  const auto f = static_cast<float>(std::max({far.x, far.y, far.z}));
-  const float step = std::nextafter(f, std::numeric_limits<float>::infinity()) - f;
-  return std::clamp(4 * static_cast<double>(step), 4 * kGridM, kMostBandM);
+  return std::max(rounding_of(box), 4 * kGridM);
 }
 
 /// Triangles of one plane.

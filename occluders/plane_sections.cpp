@@ -7,7 +7,7 @@
 namespace ivis {
 namespace {
 
-constexpr double kMostSeamM = 1e-4;  ///< seams are closed by this at most, from either side
+constexpr double kMostRoundingM = 1e-4;
 
 /// The half-plane normal.p <= offset; false when it cuts everything away.
 bool cut(Ring& ring, const Vec2& normal, double offset) {
@@ -98,14 +98,18 @@ Box2 grown(Box2 box, double by) {
   return box;
 }
 
+double rounding_of(const Aabb& box) {
+  const Vec3 far = glm::max(glm::abs(box.lo), glm::abs(box.hi));
+  const auto f = static_cast<float>(std::max({far.x, far.y, far.z}));
+  const float step = std::nextafter(f, std::numeric_limits<float>::infinity()) - f;
+  return std::min(kMostRoundingM, 4 * static_cast<double>(step));
+}
+
 PlaneSections::PlaneSections(const std::vector<ConvexPiece>& solids) : solids_(solids) {
   std::vector<Box2> boxes;
   for (const ConvexPiece& s : solids) {
-    const Vec3 far = glm::max(glm::abs(s.solid.bounds.lo), glm::abs(s.solid.bounds.hi));
-    const auto f = static_cast<float>(std::max({far.x, far.y, far.z}));
-    const float step = std::nextafter(f, std::numeric_limits<float>::infinity()) - f;
     boxes.push_back({ground(s.solid.bounds.lo), ground(s.solid.bounds.hi)});
-    seams_.push_back(s.only ? std::min(kMostSeamM, 4 * static_cast<double>(step)) : 0);
+    seams_.push_back(s.only ? rounding_of(s.solid.bounds) : 0);
   }
   tree_ = RectTree(boxes);
 }

@@ -26,9 +26,13 @@ Box2 box_of(const Ring& ring);
 Box2 grown(Box2 box, double by);
 Ring rectangle(const Box2& box);
 
-/// Sections of many convex solids by planes. Solids marked `only` count as larger by a seam: four
-/// float32 steps of their coordinates, no more than 0.1 mm, since corners in files are rounded, so
-/// that faces of neighbours come apart.
+/// What rounding may take from corners of such coordinates: four float32 steps of the largest, at
+/// most 0.1 mm.
+double rounding_of(const Aabb& box);
+
+/// Sections of many convex solids by planes. Solids marked `only` count as larger by a seam,
+/// rounding_of() their bounds, since corners in files are rounded, so that faces of neighbours come
+/// apart.
 /// Ownership: borrows the solids. Threads: const and reentrant.
 class PlaneSections {
  public:

@@ -6,14 +6,15 @@
 #include <utility>
 
 #include "core/view_cell.h"
+#include "visibility/culled_method.h"
 
 namespace ivis {
 namespace {
 
-class BackingCull final : public Method {
+class BackingCull final : public CulledMethod {
  public:
   BackingCull(std::unique_ptr<Method> method, const Scene& scene, const OccluderSet& occluders)
-      : method_(std::move(method)),
+      : CulledMethod(std::move(method)),
         scene_(scene),
         occluders_(occluders),
         first_(scene.objects.size() + 1, 0) {
@@ -23,22 +24,11 @@ class BackingCull final : public Method {
       first_[i] += first_[i - 1];
   }
 
-  const MethodTraits& traits() const override { return method_->traits(); }
-  Backend backend() const override { return method_->backend(); }
-
-  Result<Pvs> solve(const ViewCell& cell) const override {
-    return culled(method_->solve(cell), cell);
-  }
-  Result<Pvs> solve(const ViewCell& cell, LastShown& last) const override {
-    return culled(method_->solve(cell, last), cell);
-  }
-
  private:
-  Result<Pvs> culled(Result<Pvs> pvs, const ViewCell& cell) const {
-    if (!pvs || !pvs->everything_because.empty()) return pvs;
+  void cull(const ViewCell& cell, std::vector<ObjectId>& objects) const override {
     const Reach reach = padded(cell.reach, occluders_.slack_m);
     const Vec3 move = reach.half_extents();
-    std::erase_if(pvs->objects, [&](ObjectId id) {
+    std::erase_if(objects, [&](ObjectId id) {
       const std::span<const Backing> planes(occluders_.backings.data() + first_[id],
                                             first_[id + 1] - first_[id]);
       if (planes.empty() || scene_.objects[id].always_visible) return false;
@@ -55,10 +45,8 @@ class BackingCull final : public Method {
         return behind >= b.per_level * level && behind >= b.per_height * far.y;
       });
     });
-    return pvs;
   }
 
-  std::unique_ptr<Method> method_;
   const Scene& scene_;
   const OccluderSet& occluders_;
   std::vector<std::size_t> first_;  ///< backings of object i: [first_[i], first_[i + 1])
