@@ -20,6 +20,7 @@
 #include "visibility/frustum_cull.h"
 #ifdef IVIS_HAVE_GL
 #include "visibility/gl/gl_occlusion_map.h"
+#include "visibility/gl/gl_shadow_map.h"
 #endif
 
 namespace ivis::tool {
@@ -190,7 +191,8 @@ void SolveArgs::add_to(CLI::App& app, bool reach_required) {
       ->check(CLI::IsMember({"polar", "orthographic"}));
   app.add_option(
          "--backend", backend,
-         "what the occlusion map is computed on; auto: OpenGL where hardware does it, else the CPU")
+         "what draws the occlusion map, or the orthographic cull map; auto: OpenGL where hardware does "
+         "it, else the CPU")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "cpu", "gl"}));
   app.add_option("--occluders", occluders,
@@ -319,6 +321,7 @@ Result<std::unique_ptr<Method>> SolveArgs::make(const Scene& scene, const Occlud
   options.log = context.log;
 #ifdef IVIS_HAVE_GL
   options.make_gl = make_gl_occlusion_map;
+  options.make_gl_shadows = make_gl_shadow_map;
 #endif
   return make_method(method, scene, set, options);
 }

@@ -4,6 +4,7 @@
 #include <mutex>
 #include <utility>
 
+#include "visibility/cull_map.h"
 #include "visibility/occlusion_map.h"
 
 namespace ivis {
@@ -42,6 +43,10 @@ class GlWhileItWorks : public Method {
   mutable std::unique_ptr<OcclusionMap> cpu_;
 };
 
+Error not_built() {
+  return unsupported("OpenGL: this program is built without it (IVIS_WITH_GL)");
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Method>> make_occlusion_map(const Scene& scene, const OccluderSet& occluders,
@@ -59,9 +64,32 @@ Result<std::unique_ptr<Method>> make_occlusion_map(const Scene& scene, const Occ
           std::make_unique<GlWhileItWorks>(std::move(*gl), scene, occluders, options));
     if (options.log) options.log(gl.error().message + "; the occlusion map runs on the CPU");
   } else if (options.backend == Backend::kGl) {
-    return unsupported("OpenGL: this program is built without it (IVIS_WITH_GL)");
+    return not_built();
   }
   return std::unique_ptr<Method>(std::make_unique<OcclusionMap>(scene, occluders, options));
+}
+
+Result<std::unique_ptr<Method>> make_cull_map(const Scene& scene, const OccluderSet& occluders,
+                                              const MethodOptions& options) {
+  const bool asked = options.backend == Backend::kGl;
+  auto map = std::make_unique<CullMap>(scene, occluders, options);
+  if (options.map == CullMapKind::kPolar) {
+    if (asked)
+      return invalid_argument(
+          "the polar cull map has no OpenGL backend; the orthographic one and the "
+          "occlusion map have");
+  } else if (options.backend != Backend::kCpu && options.make_gl_shadows) {
+    auto shadows = options.make_gl_shadows(*map->orthographic(), options.backend);
+    if (shadows)
+      map->draw_shadows_on(std::move(*shadows));
+    else if (asked)
+      return shadows.error();
+    else if (options.log)
+      options.log(shadows.error().message + "; the orthographic map runs on the CPU");
+  } else if (asked) {
+    return not_built();
+  }
+  return std::unique_ptr<Method>(std::move(map));
 }
 
 }  // namespace ivis

@@ -69,6 +69,7 @@ struct CullMap::Scratch {
   PolarMap polar;
   Horizon horizon;
   OrthographicMap::Heights heights;
+  std::vector<ShadowChain> chains;
   std::vector<std::uint32_t> visible;
   std::vector<std::uint64_t> bits;
 };
@@ -119,6 +120,10 @@ MethodTraits CullMap::make_traits() {
 const MethodTraits& CullMap::traits() const {
   static const MethodTraits traits = make_traits();
   return traits;
+}
+
+Backend CullMap::backend() const {
+  return shadows_ && !shadows_failed_ ? Backend::kGl : Backend::kCpu;
 }
 
 std::unique_ptr<CullMap::Scratch> CullMap::take_scratch() const {
@@ -179,7 +184,7 @@ Result<Pvs> CullMap::solve(const ViewCell& cell, LastShown* last, Stats& stats) 
 
   auto scratch = take_scratch();
   scratch->visible.clear();
-  draw_selected(eye, last, *scratch, stats);
+  if (auto drawn = draw_selected(eye, last, *scratch, stats); !drawn) return drawn.error();
   find_objects(eye, *scratch, stats);
   list_ascending(scene_.objects.size(), scratch->visible, always_visible_, scratch->bits, pvs);
   give_back(std::move(scratch));
@@ -187,24 +192,25 @@ Result<Pvs> CullMap::solve(const ViewCell& cell, LastShown* last, Stats& stats) 
 }
 
 /// What MethodOptions::selection says. Drawing less is always safe.
-void CullMap::draw_selected(const Eye& eye, LastShown* last, Scratch& scratch, Stats& stats) const {
-  if (last == nullptr || options_.selection == Selection::kConservative) {
-    draw(eye, largest_solids(eye, nullptr), scratch, stats);
-    return;
-  }
-  draw(eye, largest_solids(eye, last->known ? &last->occluders : nullptr), scratch, stats);
+Status CullMap::draw_selected(const Eye& eye, LastShown* last, Scratch& scratch,
+                              Stats& stats) const {
+  if (last == nullptr || options_.selection == Selection::kConservative)
+    return draw(eye, largest_solids(eye, nullptr), scratch, stats);
+  auto drawn =
+      draw(eye, largest_solids(eye, last->known ? &last->occluders : nullptr), scratch, stats);
+  if (!drawn) return drawn;
   last->occluders.clear();
   find(walls_.tree, eye, scratch, last->occluders, stats);
   if (last->known && options_.selection == Selection::kTwoPass)
-    draw(eye, largest_solids(eye, &last->occluders), scratch, stats);
+    drawn = draw(eye, largest_solids(eye, &last->occluders), scratch, stats);
   last->known = true;
+  return drawn;
 }
 
-void CullMap::draw(const Eye& eye, const Chosen& chosen, Scratch& scratch, Stats& stats) const {
-  if (orthographic_)
-    draw_orthographic(eye, chosen, scratch);
-  else
-    draw_polar(eye, chosen, scratch, stats);
+Status CullMap::draw(const Eye& eye, const Chosen& chosen, Scratch& scratch, Stats& stats) const {
+  if (orthographic_) return draw_orthographic(eye, chosen, scratch);
+  draw_polar(eye, chosen, scratch, stats);
+  return ok();
 }
 
 /// The options_.max_occluders solids of largest projected area (width times height over distance
@@ -279,12 +285,46 @@ bool CullMap::hidden_orthographic(const BoxTree::Node& node, std::uint32_t c, co
       static_cast<float>(top + 1e-6 * std::abs(top)), finished);
 }
 
-/// Without a choice: solids near first, skipping what is in shadow already.
-void CullMap::draw_orthographic(const Eye& eye, const Chosen& chosen, Scratch& scratch) const {
+Status CullMap::draw_orthographic(const Eye& eye, const Chosen& chosen, Scratch& scratch) const {
   orthographic_->clear(scratch.heights);
+  if (shadows_ && !shadows_failed_) {
+    if (const auto drawn = draw_elsewhere(eye, chosen, scratch); !drawn) {
+      if (options_.backend == Backend::kGl) return drawn;
+      if (!shadows_failed_.exchange(true) && options_.log)
+        options_.log(drawn.error().message + "; the CPU takes over");
+      orthographic_->clear(scratch.heights);
+      draw_here(eye, chosen, scratch);
+    }
+  } else {
+    draw_here(eye, chosen, scratch);
+  }
+  orthographic_->finish(scratch.heights);
+  return ok();
+}
+
+/// Without a choice: all, hidden or not.
+Status CullMap::draw_elsewhere(const Eye& eye, const Chosen& chosen, Scratch& scratch) const {
+  scratch.chains.clear();
   if (chosen) {
     for (const std::uint32_t s : *chosen)
-      draw_orthographic(s, eye, scratch);
+      add_chains(s, eye, scratch.chains);
+  } else {
+    for (std::uint32_t s = 0; s < walls_.solids.size(); ++s)
+      add_chains(s, eye, scratch.chains);
+  }
+  return shadows_->draw(scratch.chains, eye.apex, scratch.heights);
+}
+
+/// Without a choice: solids near first, skipping what is in shadow already.
+void CullMap::draw_here(const Eye& eye, const Chosen& chosen, Scratch& scratch) const {
+  const auto draw_one = [&](std::uint32_t solid) {
+    scratch.chains.clear();
+    add_chains(solid, eye, scratch.chains);
+    orthographic_->draw(scratch.chains, eye.apex, scratch.heights);
+  };
+  if (chosen) {
+    for (const std::uint32_t s : *chosen)
+      draw_one(s);
   } else {
     struct Near {
       double distance;
@@ -307,9 +347,8 @@ void CullMap::draw_orthographic(const Eye& eye, const Chosen& chosen, Scratch& s
     });
     for (const Near& n : all)
       if (!hidden_orthographic(*n.node, n.child, eye, scratch, false))
-        draw_orthographic(n.node->child[n.child] & ~BoxTree::kItem, eye, scratch);
+        draw_one(n.node->child[n.child] & ~BoxTree::kItem);
   }
-  orthographic_->finish(scratch.heights);
 }
 
 /// Appends the items of the tree that the finished map does not hide.
@@ -365,10 +404,11 @@ void CullMap::find_objects(const Eye& eye, Scratch& scratch, Stats& stats) const
   }
 }
 
-void CullMap::draw_orthographic(std::uint32_t solid, const Eye& eye, Scratch& scratch) const {
+void CullMap::add_chains(std::uint32_t solid, const Eye& eye,
+                         std::vector<ShadowChain>& chains) const {
   const WallSet::Solid& s = walls_.solids[solid];
   if ((s.floored && eye.floors.above_floor) || (s.grounded && eye.floors.on_ground))
-    orthographic_->draw(walls_, s, eye.apex, scratch.heights);
+    OrthographicMap::add_chains(walls_, s, eye.apex, chains);
 }
 
 }  // namespace ivis

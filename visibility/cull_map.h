@@ -1,8 +1,10 @@
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "visibility/box_tree.h"
@@ -36,6 +38,12 @@ class CullMap : public Method {
           const PolarGuards& guards = {}, std::uint32_t bins_a_face = kBinsAFace);
   ~CullMap() override;
   const MethodTraits& traits() const override;
+  Backend backend() const override;
+  /// Null for the polar map.
+  const OrthographicMap* orthographic() const { return orthographic_.get(); }
+  /// From now on the orthographic map's shadows are drawn there, until that fails: then the solve
+  /// fails if options.backend is kGl, else they are drawn here for good. Not while it solves.
+  void draw_shadows_on(std::unique_ptr<ShadowDrawer> shadows) { shadows_ = std::move(shadows); }
   /// An eye inside an occluder gets everything, and the Pvs says so. An eye under the ground,
   /// within OccluderSet::ground, gets a set that promises nothing, and nothing says so: of the
   /// ground only the rectangle is known here, not the heights, and such viewpoints do not count
@@ -55,11 +63,13 @@ class CullMap : public Method {
 
   Result<Pvs> solve(const ViewCell& cell, LastShown* last, Stats& stats) const;
   Chosen largest_solids(const Eye& eye, const std::vector<std::uint32_t>* among) const;
-  void draw_selected(const Eye& eye, LastShown* last, Scratch& scratch, Stats& stats) const;
-  void draw(const Eye& eye, const Chosen& chosen, Scratch& scratch, Stats& stats) const;
+  Status draw_selected(const Eye& eye, LastShown* last, Scratch& scratch, Stats& stats) const;
+  Status draw(const Eye& eye, const Chosen& chosen, Scratch& scratch, Stats& stats) const;
   void draw_polar(const Eye& eye, const Chosen& chosen, Scratch& scratch, Stats& stats) const;
-  void draw_orthographic(const Eye& eye, const Chosen& chosen, Scratch& scratch) const;
-  void draw_orthographic(std::uint32_t solid, const Eye& eye, Scratch& scratch) const;
+  Status draw_orthographic(const Eye& eye, const Chosen& chosen, Scratch& scratch) const;
+  Status draw_elsewhere(const Eye& eye, const Chosen& chosen, Scratch& scratch) const;
+  void draw_here(const Eye& eye, const Chosen& chosen, Scratch& scratch) const;
+  void add_chains(std::uint32_t solid, const Eye& eye, std::vector<ShadowChain>& chains) const;
   bool hidden_orthographic(const BoxTree::Node& node, std::uint32_t c, const Eye& eye,
                            const Scratch& scratch, bool finished) const;
   void find(const BoxTree& tree, const Eye& eye, Scratch& scratch,
@@ -82,6 +92,8 @@ class CullMap : public Method {
   std::vector<ObjectId> always_visible_;
   SolidIndex solids_;
   std::unique_ptr<OrthographicMap> orthographic_;
+  std::unique_ptr<ShadowDrawer> shadows_;
+  mutable std::atomic<bool> shadows_failed_{false};
   std::unique_ptr<TerrainMap> terrain_;
   mutable std::mutex scratch_mutex_;
   mutable std::vector<std::unique_ptr<Scratch>> scratch_;

@@ -45,9 +45,7 @@ struct Entry {
 const std::vector<Entry>& entries() {
   static const std::vector<Entry> all{
       {CullMap::make_traits(),
-       [](const Scene& s, const OccluderSet& o, const MethodOptions& m) -> Made {
-         return std::unique_ptr<Method>(std::make_unique<CullMap>(s, o, m));
-       }},
+       make_cull_map, true},
       {OcclusionMap::make_traits(), make_occlusion_map, true},
       {reference_traits(),
        [](const Scene& s, const OccluderSet& o, const MethodOptions& m) -> Made {
@@ -82,7 +80,8 @@ Result<std::unique_ptr<Method>> make_method(std::string_view name, const Scene& 
                         std::to_string(scene.objects.size()));
       if (options.backend == Backend::kGl && !e.has_gl)
         return invalid_argument("method '" + e.traits.name +
-                                "' has no OpenGL backend; 'occlusion-map' has");
+                                "' has no OpenGL backend; 'occlusion-map' has, and 'cull-map' with "
+                                "the orthographic map");
       auto made = e.make(scene, occluders, options);
       if (!made || !e.traits.needs_occluders || occluders.backings.empty()) return made;
       return cull_backed(std::move(*made), scene, occluders);

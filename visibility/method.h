@@ -31,7 +31,7 @@ struct MethodTraits {
 /// Which map the cull map is sampled on.
 enum class CullMapKind { kPolar, kOrthographic };
 
-/// What the occlusion map is computed on.
+/// What the occlusion map and the orthographic cull map are drawn on.
 enum class Backend {
   kAuto,  ///< OpenGL where it is built in and drawn by hardware, else and on any failure the CPU
   kCpu,
@@ -62,6 +62,12 @@ struct MethodOptions;
 using GlFactory = std::function<Result<std::unique_ptr<Method>>(const Scene&, const OccluderSet&,
                                                                 const MethodOptions&)>;
 
+class OrthographicMap;
+class ShadowDrawer;
+/// Makes what draws the orthographic cull map's shadows with OpenGL; likewise.
+using GlShadows =
+    std::function<Result<std::unique_ptr<ShadowDrawer>>(const OrthographicMap&, Backend)>;
+
 struct MethodOptions {
   CullMapKind map = CullMapKind::kPolar;
   /// Threads inside one solve. The result has the same bits whatever the number.
@@ -77,6 +83,8 @@ struct MethodOptions {
   Backend backend = Backend::kAuto;
   /// make_gl_occlusion_map of visibility/gl, from programs that link it; null: there is no OpenGL.
   GlFactory make_gl;
+  /// make_gl_shadow_map of visibility/gl, likewise.
+  GlShadows make_gl_shadows;
   /// Told once when Backend::kAuto does without OpenGL though it is built in; from any thread.
   std::function<void(std::string_view)> log;
   /// Reference method: aimed rays an object.

@@ -30,23 +30,6 @@ void clip_row(const Vec2& a, double sign, double z, double& x0, double& x1) {
 
 }  // namespace
 
-/// Walls joined at corners whose azimuth rises by less than half a turn, relative to the eye.
-struct OrthographicMap::Chain {
-  std::vector<Vec2> corners;
-  std::vector<Vec2> plane;  ///< of wall j: dot(plane, p) = 1 on its line, > 1 behind it
-  double top = 0;           ///< relative to the eye
-  Vec2 eye{0};              ///< relative to the origin
-
-  void end() {
-    corners.clear();
-    plane.clear();
-  }
-  void begin(const Vec2& first) {
-    end();
-    corners.push_back(first);
-  }
-};
-
 OrthographicMap::OrthographicMap(const Aabb& bounds, double square_m) {
   if (bounds.empty()) return;
   const Vec3 size = bounds.size();
@@ -67,21 +50,29 @@ void OrthographicMap::clear(Heights& heights) const {
   heights.least.assign(total_, kNothing);
 }
 
-void OrthographicMap::draw(const WallSet& walls, const WallSet::Solid& solid, const Vec3& eye,
-                           Heights& heights) const {
-  if (levels_.empty()) return;
-  Chain chain;
+OrthographicMap::Grid OrthographicMap::grid() const {
+  if (levels_.empty()) return {};
+  return {lo_, square_m_, levels_[0].columns, levels_[0].rows};
+}
+
+void OrthographicMap::add_chains(const WallSet& walls, const WallSet::Solid& solid, const Vec3& eye,
+                                 std::vector<ShadowChain>& chains) {
+  ShadowChain chain;
   chain.top = static_cast<double>(solid.top) - eye.y;
-  chain.eye = ground(eye);
+  const Vec2 at_eye = ground(eye);
+  const auto end = [&] {
+    if (!chain.plane.empty()) chains.push_back(chain);
+    chain.corners.clear();
+    chain.plane.clear();
+  };
   // A top above the eye throws its shadow from the near wall, one below it from the far wall.
   const bool away = chain.top < 0;
   for (std::uint32_t r = 0; r < solid.rings; ++r) {
     const WallSet::Ring& ring = walls.rings[solid.first_ring + r];
     const auto corner = [&](std::uint32_t i) {
       const std::uint32_t at = ring.first + i % ring.count;
-      return Vec2{static_cast<double>(walls.x[at]), static_cast<double>(walls.z[at])} - chain.eye;
+      return Vec2{static_cast<double>(walls.x[at]), static_cast<double>(walls.z[at])} - at_eye;
     };
-    chain.end();
     // Once around, beginning at an edge that is not wanted, so that no run is cut at the seam.
     const auto wanted = [&](std::uint32_t e) {
       const double turn = cross(corner(e), corner(e + 1));
@@ -97,30 +88,33 @@ void OrthographicMap::draw(const WallSet& walls, const WallSet::Solid& solid, co
       const Vec2 b = away ? corner(e + 1) : corner(e);
       const double c = cross(a, b);
       if (!wanted(e) || !(c > 0)) {
-        draw_chain(chain, heights);
-        chain.end();
+        end();
         continue;
       }
-      if (chain.corners.empty()) chain.begin(a);
       // Less than half a turn in all, or the wedge is no intersection of half-planes.
-      if (cross(chain.corners.front(), b) <= 0) {
-        draw_chain(chain, heights);
-        chain.begin(a);
-      }
+      if (!chain.corners.empty() && cross(chain.corners.front(), b) <= 0) end();
+      if (chain.corners.empty()) chain.corners.push_back(a);
       chain.corners.push_back(b);
       chain.plane.push_back(Vec2{b.y - a.y, a.x - b.x} /
                             c);  // (b-a) turned; dot with a is cross(a,b)/c = 1
     }
-    draw_chain(chain, heights);
+    end();
   }
+}
+
+void OrthographicMap::draw(const std::vector<ShadowChain>& chains, const Vec3& eye,
+                           Heights& heights) const {
+  if (levels_.empty()) return;
+  for (const ShadowChain& chain : chains)
+    draw_chain(chain, ground(eye), heights);
 }
 
 // Over the part of a square that wall j's azimuths take, the shadow's height top * dot(plane_j, p)
 // is linear, so it is nowhere below the least value at the square's corners; over the whole square
 // it is nowhere below the least over the walls its corners' azimuths span. The square is in shadow
 // if it lies behind the lines of all those walls.
-void OrthographicMap::draw_chain(const Chain& chain, Heights& heights) const {
-  if (chain.plane.empty()) return;
+void OrthographicMap::draw_chain(const ShadowChain& chain, const Vec2& eye,
+                                 Heights& heights) const {
   const Level& grid = levels_[0];
   const Vec2& first = chain.corners.front();
   const Vec2& last = chain.corners.back();
@@ -136,8 +130,8 @@ void OrthographicMap::draw_chain(const Chain& chain, Heights& heights) const {
   std::int32_t above_c0 = 0;
   std::int32_t above_c1 = -1;
   for (std::int32_t r = 0; r <= grid.rows; ++r) {
-    const double z = lo_.y + r * square_m_ - chain.eye.y;
-    const double x_lo = lo_.x - chain.eye.x;
+    const double z = lo_.y + r * square_m_ - eye.y;
+    const double x_lo = lo_.x - eye.x;
     double x0 = x_lo;
     double x1 = x_lo + grid.columns * square_m_;
     clip_row(first, 1, z, x0, x1);

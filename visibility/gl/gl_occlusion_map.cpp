@@ -13,6 +13,7 @@
 
 #include "core/assert.h"
 #include "visibility/answer.h"
+#include "visibility/gl/gl_program.h"
 #include "visibility/gl/gl_shaders.h"
 #include "visibility/sub_boxes.h"
 
@@ -32,42 +33,6 @@ float down(double v) {
 float up(double v) {
   const auto f = static_cast<float>(v);
   return f < v ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
-}
-
-struct Source {
-  GLenum stage;
-  const char* text;
-};
-
-std::string log_of(GLuint name, bool program) {
-  char text[1024] = {};
-  program ? glGetProgramInfoLog(name, sizeof text, nullptr, text)
-          : glGetShaderInfoLog(name, sizeof text, nullptr, text);
-  return text;
-}
-
-Result<GLuint> link(const std::vector<Source>& sources, const char* what) {
-  const GLuint program = glCreateProgram();
-  for (const Source& source : sources) {
-    const GLuint shader = glCreateShader(source.stage);
-    const char* parts[] = {kCommonShader, source.text};
-    glShaderSource(shader, 2, parts, nullptr);
-    glCompileShader(shader);
-    GLint good = GL_FALSE;
-    glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
-    if (good != GL_TRUE)
-      return unsupported(std::string("OpenGL: the ") + what +
-                         " shader is refused: " + log_of(shader, false));
-    glAttachShader(program, shader);
-    glDeleteShader(shader);
-  }
-  glLinkProgram(program);
-  GLint good = GL_FALSE;
-  glGetProgramiv(program, GL_LINK_STATUS, &good);
-  if (good != GL_TRUE)
-    return unsupported(std::string("OpenGL: the ") + what +
-                       " program does not link: " + log_of(program, true));
-  return program;
 }
 
 GLint limit(GLenum name) {
@@ -223,12 +188,12 @@ Status GlOcclusionMap::make_programs() {
     return unsupported("OpenGL: vertex shaders have no storage buffers (" + context_->renderer() +
                        ")");
   const auto draw =
-      link({{GL_VERTEX_SHADER, kDrawVertexShader}, {GL_FRAGMENT_SHADER, kDrawFragmentShader}},
+      link_program({{GL_VERTEX_SHADER, kDrawVertexShader}, {GL_FRAGMENT_SHADER, kDrawFragmentShader}},
            "drawing");
   if (!draw) return draw.error();
-  const auto pyramid = link({{GL_COMPUTE_SHADER, kPyramidShader}}, "pyramid's");
+  const auto pyramid = link_program({{GL_COMPUTE_SHADER, kPyramidShader}}, "pyramid's");
   if (!pyramid) return pyramid.error();
-  const auto test = link({{GL_COMPUTE_SHADER, kTestShader}}, "test's");
+  const auto test = link_program({{GL_COMPUTE_SHADER, kTestShader}}, "test's");
   if (!test) return test.error();
   draw_program_ = *draw;
   pyramid_program_ = *pyramid;
@@ -274,7 +239,8 @@ Status GlOcclusionMap::make_map() {
   }
   IVIS_ASSERT(!begins_.empty() && begins_.size() <= 8, "levels of the pyramid");
   glProgramUniform1i(test_program_, 6, static_cast<GLint>(begins_.size()));
-  glProgramUniform1iv(test_program_, 7, static_cast<GLsizei>(begins_.size()), begins_.data());
+  // By level, so that no compiler sees an index of -1 in the branch that level 0 does not take.
+  glProgramUniform1iv(test_program_, 8, static_cast<GLsizei>(begins_.size()), begins_.data());
   glCreateBuffers(1, &pyramid_);
   glNamedBufferStorage(pyramid_, static_cast<GLsizeiptr>(values) * 4, nullptr, 0);
   glCreateVertexArrays(1, &empty_array_);

@@ -1,5 +1,6 @@
 #pragma once
-// The GLSL of the occlusion map. Why it errs to visible: gl_occlusion_map.h.
+// The GLSL of the occlusion map and of the orthographic cull map. Why they err to visible:
+// gl_occlusion_map.h, gl_shadow_map.h.
 
 namespace ivis {
 
@@ -127,14 +128,14 @@ layout(location = 3) uniform float near_m;
 layout(location = 4) uniform float pixel_guard;
 layout(location = 5) uniform float relative;
 layout(location = 6) uniform int top;        // the last level
-layout(location = 7) uniform int begins[8];  // of levels 1, 2, ...
+layout(location = 7) uniform int begins[9];  // of the levels; of 0, the map itself, nothing
 const int kMostCells = 1024;
 shared uint words[2];
 
 float least_of(int level, int side, int i, int j) {
   if (level == 0) return texelFetch(map, ivec3(i, j, side), 0).x;
   int width = (int(pixels) + (1 << (2 * level)) - 1) >> (2 * level);
-  return pyramid[begins[level - 1] + (side * width + j) * width + i];
+  return pyramid[begins[level] + (side * width + j) * width + i];
 }
 
 // Whether all pixels lo..hi are at least q. Cells that stick out of the rectangle are looked at
@@ -198,6 +199,58 @@ void main() {
   barrier();
   if (gl_LocalInvocationIndex < 2u && group * 64u < count)
     visible[2u * group + gl_LocalInvocationIndex] = words[gl_LocalInvocationIndex];
+}
+)";
+
+/// Corners of polygons on the grid, each of one wall.
+inline constexpr const char* kShadowVertexShader = R"(
+layout(location = 0) in vec2 at;
+layout(location = 1) in uint wall;
+flat out uint wall_index;
+
+void main() {
+  wall_index = wall;
+  gl_Position = vec4(at, 0.0, 1.0);
+}
+)";
+
+/// A wall of a solid's shadow is ShadowWall of gl_shadow_map.cpp. In double precision, as the CPU.
+inline constexpr const char* kShadowFragmentShader = R"(
+struct Wall { dvec2 a; dvec2 b; dvec2 plane; double top; uint first; uint count; };
+layout(std430, binding = 0) readonly buffer Walls { Wall walls[]; };
+layout(location = 0) uniform dvec2 lo;
+layout(location = 1) uniform double square_m;
+flat in uint wall_index;
+layout(location = 0) out float height;
+
+double cross2(dvec2 a, dvec2 b) { return a.x * b.y - a.y * b.x; }
+
+// As OrthographicMap::draw_chain(), which says why.
+void main() {
+  uint first = walls[wall_index].first;
+  uint last = first + walls[wall_index].count - 1u;
+  ivec2 square = ivec2(gl_FragCoord.xy);
+  dvec2 p[4];
+  uint j0 = last;
+  uint j1 = first;
+  for (int k = 0; k < 4; ++k) {
+    p[k] = lo + dvec2(square + ivec2(k & 1, k >> 1)) * square_m;
+    if (!(cross2(walls[first].a, p[k]) > 0.0lf && cross2(walls[last].b, p[k]) < 0.0lf)) discard;
+    uint j = wall_index;
+    while (j > first && cross2(walls[j].a, p[k]) < 0.0lf) --j;
+    while (j < last && cross2(walls[j].b, p[k]) > 0.0lf) ++j;
+    j0 = min(j0, j);
+    j1 = max(j1, j);
+  }
+  double top = walls[wall_index].top;
+  double least = 1e30lf;
+  for (uint j = j0; j <= j1; ++j)
+    for (int k = 0; k < 4; ++k) {
+      double behind = dot(walls[j].plane, p[k]);
+      if (!(behind > 1.0lf)) discard;
+      least = min(least, top * behind);
+    }
+  height = float(least - 1e-6lf * abs(least));
 }
 )";
 
