@@ -17,6 +17,13 @@ ivis::Vec3 vec(const double p[3]) {
   return {p[0], p[1], p[2]};
 }
 
+constexpr const char* kBadPace =
+    "a pace out of bounds, expected speeds of 0 to 1e6 m/s and frames of 0 to 3600 s";
+
+ivis::Pace pace_of(const ivis_pace& p) {
+  return {p.horizontal_m_s, p.vertical_m_s, p.frame_s};
+}
+
 /// Out of memory is all that may be thrown inside; the caller is C.
 template <class F>
 ivis_status guarded(ivis_client* client, F&& body) {
@@ -66,10 +73,23 @@ ivis_status ivis_client_connect(const ivis_client_options* options, ivis_client*
     network.endpoint = options->endpoint;
     network.scene_hash = options->scene_hash;
     network.reach = options->reach != nullptr ? options->reach : "";
+    network.pace = pace_of(options->pace);
+    if (!network.pace.valid()) return refuse(IVIS_ERROR_ARGUMENT, kBadPace);
+    if (options->strategy < IVIS_STRATEGY_SERVER || options->strategy > IVIS_STRATEGY_PREDICTIVE)
+      return refuse(IVIS_ERROR_ARGUMENT,
+                    "unknown strategy " + std::to_string(static_cast<int>(options->strategy)));
+    if (options->strategy != IVIS_STRATEGY_SERVER)
+      network.strategy = static_cast<ivis::Strategy>(options->strategy - IVIS_STRATEGY_GUARANTEED);
+    network.budget_us = options->budget_us;
     network.silence = std::chrono::milliseconds(options->silence_timeout_ms);
     auto source = ivis::client::NetworkSource::open(network);
     if (!source) return refuse(ivis::client::status_of(source.error()), source.error().message);
-    auto made = std::make_unique<ivis_client>(std::move(*source), options->policy);
+    ivis_client::Options own;
+    own.policy = options->policy;
+    own.pace = network.pace;
+    own.predict = options->predict != 0;
+    own.linger_frames = options->linger_frames;
+    auto made = std::make_unique<ivis_client>(std::move(*source), std::move(own));
     if (options->connect_timeout_ms > 0)
       if (const ivis_status met =
               made->meet(std::chrono::milliseconds(options->connect_timeout_ms));
@@ -85,11 +105,34 @@ ivis_status ivis_client_connect(const ivis_client_options* options, ivis_client*
 ivis_client* ivis_client_adopt_source_(void* pvs_source, ivis_policy policy) {
   std::unique_ptr<ivis::client::PvsSource> source(
       static_cast<ivis::client::PvsSource*>(pvs_source));
-  return new (std::nothrow) ivis_client(std::move(source), policy);
+  ivis_client::Options own;
+  own.policy = policy;
+  return new (std::nothrow) ivis_client(std::move(source), std::move(own));
 }
 
 void ivis_client_close(ivis_client* client) {
   delete client;
+}
+
+ivis_status ivis_client_set_policy(ivis_client* client, ivis_policy policy) {
+  if (client == nullptr) return IVIS_ERROR_ARGUMENT;
+  return guarded(client, [&] {
+    if (policy < IVIS_POLICY_EVERYTHING || policy > IVIS_POLICY_INCOMPLETE)
+      return client->fail(IVIS_ERROR_ARGUMENT,
+                          "unknown policy " + std::to_string(static_cast<int>(policy)));
+    client->set_policy(policy);
+    return IVIS_OK;
+  });
+}
+
+ivis_status ivis_client_set_pace(ivis_client* client, const ivis_pace* pace) {
+  if (client == nullptr || pace == nullptr) return IVIS_ERROR_ARGUMENT;
+  return guarded(client, [&] {
+    const ivis::Pace wanted = pace_of(*pace);
+    if (!wanted.valid()) return client->fail(IVIS_ERROR_ARGUMENT, kBadPace);
+    client->set_pace(wanted);
+    return IVIS_OK;
+  });
 }
 
 ivis_status ivis_client_pose(ivis_client* client, const double eye[3]) {
@@ -126,7 +169,7 @@ ivis_status ivis_client_info(const ivis_client* client, ivis_info* out) {
   *out = ivis_info{0, 0, "", ""};
   const Catalogue* c = client->source().catalogue();
   if (c == nullptr) return IVIS_ERROR_CONNECTION;
-  *out = {c->scene_hash, c->objects(), c->reach.c_str(), c->method.c_str()};
+  *out = {c->scene_hash, c->objects(), client->largest_reach(), c->method.c_str()};
   return IVIS_OK;
 }
 
@@ -172,6 +215,26 @@ ivis_status ivis_object_ids(const ivis_client* client, uint32_t node, uint32_t i
 
 const char* ivis_client_error(const ivis_client* client) {
   return client != nullptr ? client->error().c_str() : "no client";
+}
+
+const char* ivis_cause_name(ivis_cause cause) {
+  switch (cause) {
+    case IVIS_CAUSE_NONE:
+      return "none";
+    case IVIS_CAUSE_NO_ANSWER:
+      return "no answer yet";
+    case IVIS_CAUSE_DISCONNECTED:
+      return "disconnected";
+    case IVIS_CAUSE_SPEED:
+      return "faster than told";
+    case IVIS_CAUSE_LADDER:
+      return "no cell so large";
+    case IVIS_CAUSE_LATE:
+      return "late";
+    case IVIS_CAUSE_OTHER:
+      return "not measured";
+  }
+  return "unknown";
 }
 
 const char* ivis_status_name(ivis_status status) {

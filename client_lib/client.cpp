@@ -16,6 +16,13 @@ bool finite(const Vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+double seconds(std::chrono::steady_clock::duration d) {
+  return std::chrono::duration<double>(d).count();
+}
+double milliseconds(std::chrono::steady_clock::duration d) {
+  return 1e3 * seconds(d);
+}
+
 void put(const Vec3& v, double (&out)[3]) {
   for (int k = 0; k < 3; ++k)
     out[k] = v[k];
@@ -74,8 +81,27 @@ Status check_catalogue(const Catalogue& c) {
 
 }  // namespace ivis::client
 
-ivis_client::ivis_client(std::unique_ptr<ivis::client::PvsSource> source, ivis_policy policy)
-    : source_(std::move(source)), policy_(policy) {}
+ivis_client::ivis_client(std::unique_ptr<ivis::client::PvsSource> source, Options options)
+    : source_(std::move(source)),
+      options_(std::move(options)),
+      lingering_(options_.linger_frames) {}
+
+void ivis_client::set_pace(const ivis::Pace& pace) {
+  options_.pace = pace;
+  source_->set_pace(pace);
+}
+
+const char* ivis_client::largest_reach() const {
+  const ivis::client::Catalogue* c = source_->catalogue();
+  if (c == nullptr) return nullptr;
+  largest_reach_ = c->reaches.back().to_string();
+  return largest_reach_.c_str();
+}
+
+const ivis_client::Sent* ivis_client::sent(std::uint32_t sequence) const {
+  const Sent& s = sent_[sequence % sent_.size()];
+  return sequence != 0 && s.sequence == sequence ? &s : nullptr;
+}
 
 ivis_status ivis_client::fail(ivis_status status, std::string text) {
   error_ = std::move(text);
@@ -92,20 +118,29 @@ ivis_status ivis_client::state() {
 void ivis_client::take() {
   if (!source_->receive(answer_)) return;
   stats_.last_solve_ms = answer_.solve_ms;
-  const Sent& sent = sent_[answer_.sequence % sent_.size()];
-  if (sent.sequence == answer_.sequence)
-    stats_.last_round_trip_ms =
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - sent.at)
-            .count();
+  cell_reach_ = answer_.cell.reach.to_string();
+  if (const Sent* s = sent(answer_.sequence))
+    stats_.last_round_trip_ms = milliseconds(options_.now() - s->at);
 }
 
 ivis_status ivis_client::pose(const Vec3& eye) {
   if (!finite(eye)) return fail(IVIS_ERROR_ARGUMENT, "an eye that is not finite");
   take();  // first: the pose acknowledges what has arrived
+  const Time now = options_.now();
+  Vec3 centre = eye;
+  const Sent* before = sent(sequence_);
+  if (options_.predict && before != nullptr && now > before->at) {
+    // To the middle of where the PVS will be in use, if the observer goes on as it went.
+    const Vec3 velocity = (eye - before->eye) / seconds(now - before->at);
+    const Vec3 ahead = velocity * (seconds(clock_.latency() + clock_.hold()) / 2);
+    if (finite(ahead)) centre += ahead;
+  }
   ++sequence_;
   ++stats_.poses;
-  sent_[sequence_ % sent_.size()] = {sequence_, std::chrono::steady_clock::now()};
-  source_->send(sequence_, eye);
+  const auto hold = std::chrono::ceil<std::chrono::microseconds>(clock_.hold()).count();
+  const auto hold_us = static_cast<std::uint32_t>(std::clamp<std::int64_t>(hold, 0, UINT32_MAX));
+  sent_[sequence_ % sent_.size()] = {sequence_, now, eye, hold_us};
+  source_->send({sequence_, centre, hold_us});
   return state();
 }
 
@@ -147,41 +182,87 @@ const IdBits& ivis_client::all_bits() {
   return all_;
 }
 
+ivis_cause ivis_client::why_outside(const Vec3& eye, Time now) const {
+  if (answer_.sequence == 0) return IVIS_CAUSE_NO_ANSWER;
+  if (!source_->connected()) return IVIS_CAUSE_DISCONNECTED;
+  const Sent* s = sent(answer_.sequence);
+  if (s == nullptr) return IVIS_CAUSE_LATE;
+  const ivis::Pace& pace = options_.pace;
+  if (!pace.told() || s->hold_us == 0) return IVIS_CAUSE_OTHER;
+  const double age_s = seconds(now - s->at);
+  const Vec3 moved = eye - s->eye;
+  constexpr double kMore = 1.001;
+  if (std::hypot(moved.x, moved.z) > pace.horizontal_m_s * age_s * kMore + 1e-3 ||
+      std::abs(moved.y) > pace.vertical_m_s * age_s * kMore + 1e-3)
+    return IVIS_CAUSE_SPEED;
+  if (answer_.safe < 1) return IVIS_CAUSE_LADDER;
+  return age_s * 1e6 > s->hold_us ? IVIS_CAUSE_LATE : IVIS_CAUSE_OTHER;
+}
+
 ivis_status ivis_client::view(const Vec3& eye, ivis_frame& out) {
   take();
   out = {};
   put(eye, out.eye);
   ++stats_.frames;
+  const Time now = options_.now();
   const ivis::client::Catalogue* catalogue = source_->catalogue();
   const std::uint32_t objects = catalogue != nullptr ? catalogue->objects() : 0;
   const bool has_pvs = answer_.sequence != 0;
   const bool sound = finite(eye);
+  const bool fresh = answer_.sequence != in_use_;
+  if (const auto sessions = source_->stats().reconnects; sessions != stats_.reconnects) {
+    stats_.reconnects = sessions;
+    clock_.interrupt();  // how long it was away says nothing of how long answers take
+  }
+  if (fresh && sent(answer_.sequence) != nullptr)
+    clock_.begins(sent(answer_.sequence)->at, now);
+  else if (has_pvs)
+    clock_.used(now);
+  in_use_ = answer_.sequence;
 
   // A PVS that lists everything is complete wherever the eye is.
-  bool covered = sound && has_pvs && (answer_.everything || answer_.cell.contains(eye));
-  bool use_pvs = covered;
-  if (sound && has_pvs && !covered && policy_ == IVIS_POLICY_STALL) {
-    put(ivis::client::clamp_to_cell(answer_.cell, eye), out.eye);
+  const bool inside = sound && has_pvs && (answer_.everything || answer_.cell.contains(eye));
+  bool covered = inside;
+  bool use_pvs = inside;
+  if (sound && !inside) {
+    out.cause = static_cast<std::uint8_t>(why_outside(eye, now));
+    ++stats_.causes[out.cause];
+  }
+  if (sound && has_pvs && !inside && options_.policy == IVIS_POLICY_STALL) {
+    const Vec3 held = ivis::client::clamp_to_cell(answer_.cell, eye);
+    put(held, out.eye);
     out.stalled = 1;
     ++stats_.stalls;
+    stats_.held_m += glm::distance(held, eye);
     covered = use_pvs = true;  // clamp_to_cell() promises it
   }
-  if (sound && has_pvs && !covered && policy_ == IVIS_POLICY_INCOMPLETE) use_pvs = true;
+  if (sound && has_pvs && !inside && options_.policy == IVIS_POLICY_INCOMPLETE) use_pvs = true;
   if (!covered) ++stats_.uncovered_frames;
 
   out.covered = covered ? 1 : 0;
   out.connected = source_->connected() ? 1 : 0;
   out.object_count = objects;
+  out.cell_reach = cell_reach_.c_str();
+  out.safe = 1;
   if (has_pvs) {
     out.sequence = answer_.sequence;
     put(answer_.cell.eye, out.cell_eye);
+    out.safe = answer_.safe;
+    if (const Sent* s = sent(answer_.sequence)) out.pvs_age_s = seconds(now - s->at);
+    if (inside) out.margin_m = ivis::client::margin_in_cell(answer_.cell, eye);
   } else {
     put(eye, out.cell_eye);
   }
+  const IdBits* bits = &answer_.bits;
+  std::uint32_t count = answer_.count;
+  if (lingering_.active() && has_pvs) {
+    bits = &lingering_.draw(answer_.everything ? all_bits() : answer_.bits, fresh);
+    count = lingering_.count();
+  }
   out.everything = !use_pvs || answer_.everything ? 1 : 0;
-  out.visible_count = out.everything != 0 ? objects : answer_.count;
-  const IdBits& bits = out.everything != 0 ? all_bits() : answer_.bits;
-  out.visible_bits = objects != 0 ? bits.data() : nullptr;
+  out.visible_count = out.everything != 0 ? objects : count;
+  if (out.everything != 0) bits = &all_bits();
+  out.visible_bits = objects != 0 ? bits->data() : nullptr;
   if (!sound) return fail(IVIS_ERROR_ARGUMENT, "an eye that is not finite");
   return state();
 }
@@ -193,5 +274,8 @@ ivis_stats ivis_client::stats() const {
   out.bytes = s.bytes;
   out.reconnects = s.reconnects;
   out.bad_messages = s.bad_messages;
+  out.latency_ms = milliseconds(clock_.latency());
+  out.interval_ms = milliseconds(clock_.interval());
+  out.hold_ms = milliseconds(clock_.hold());
   return out;
 }

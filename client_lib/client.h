@@ -3,16 +3,28 @@
 
 #include <array>
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <string>
 
 #include "client_lib/include/ivis/ivis.h"
+#include "client_lib/lingering.h"
 #include "client_lib/source.h"
+#include "client_lib/visibility_clock.h"
 
 /// Behind the C interface. Threads: one at a time.
 struct ivis_client {
  public:
-  ivis_client(std::unique_ptr<ivis::client::PvsSource> source, ivis_policy policy);
+  using Time = std::chrono::steady_clock::time_point;
+  struct Options {
+    ivis_policy policy = IVIS_POLICY_EVERYTHING;
+    ivis::Pace pace;  ///< told to the source by who made it
+    bool predict = false;
+    std::uint32_t linger_frames = 0;
+    /// For tests, of time that passes as they say. Monotonic.
+    std::function<Time()> now = std::chrono::steady_clock::now;
+  };
+  ivis_client(std::unique_ptr<ivis::client::PvsSource> source, Options options);
 
   ivis_status pose(const ivis::Vec3& eye);
   ivis_status wait(std::chrono::milliseconds timeout);
@@ -20,8 +32,12 @@ struct ivis_client {
   /// Waits for the catalogue.
   ivis_status meet(std::chrono::milliseconds timeout);
   ivis_status fail(ivis_status status, std::string text);
+  void set_policy(ivis_policy policy) { options_.policy = policy; }
+  void set_pace(const ivis::Pace& pace);
 
   const ivis::client::PvsSource& source() const { return *source_; }
+  /// Null until the catalogue is known. Valid until the next call.
+  const char* largest_reach() const;
   const std::string& error() const { return error_; }
   ivis_stats stats() const;
 
@@ -29,13 +45,23 @@ struct ivis_client {
   void take();
   ivis_status state();
   const ivis::client::IdBits& all_bits();
+  ivis_cause why_outside(const ivis::Vec3& eye, Time now) const;
 
   struct Sent {
     std::uint32_t sequence = 0;
-    std::chrono::steady_clock::time_point at;
+    Time at;
+    ivis::Vec3 eye{0};
+    std::uint32_t hold_us = 0;
   };
+  const Sent* sent(std::uint32_t sequence) const;
+
   std::unique_ptr<ivis::client::PvsSource> source_;
-  ivis_policy policy_;
+  Options options_;
+  ivis::client::VisibilityClock clock_;
+  ivis::client::Lingering lingering_;
+  std::uint32_t in_use_ = 0;  ///< sequence of the answer that the last view took
+  std::string cell_reach_;
+  mutable std::string largest_reach_;
   ivis::client::Answer answer_;
   ivis::client::IdBits all_;
   std::uint32_t sequence_ = 0;

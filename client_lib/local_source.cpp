@@ -26,13 +26,14 @@ class LocalSource : public PvsSource {
   LocalSource& operator=(const LocalSource&) = delete;
 
   const Catalogue* catalogue() const override { return &world_.catalogue; }
-  void send(std::uint32_t sequence, const Vec3& eye) override {
+  void send(const Request& request) override {
     {
       const std::lock_guard lock(mutex_);
-      pose_ = {sequence, eye};
+      pose_ = request;
     }
     changed_.notify_all();
   }
+  void set_pace(const Pace& /*pace*/) override {}  // one reach, whatever the pace
   bool receive(Answer& answer) override {
     const std::lock_guard lock(mutex_);
     if (!fresh_) return false;
@@ -63,8 +64,8 @@ class LocalSource : public PvsSource {
         std::unique_lock lock(mutex_);
         changed_.wait(lock, [this] { return closing_ || pose_.has_value(); });
         if (closing_) return;
-        next.sequence = pose_->first;
-        next.cell = {pose_->second, world_.reach};
+        next.sequence = pose_->sequence;
+        next.cell = {pose_->centre, world_.reach};
         pose_.reset();
       }
       std::string trouble = solve(next);
@@ -121,7 +122,7 @@ class LocalSource : public PvsSource {
   std::condition_variable changed_;
   bool closing_ = false;
   bool fresh_ = false;
-  std::optional<std::pair<std::uint32_t, Vec3>> pose_;
+  std::optional<Request> pose_;
   Answer slot_;
   SourceStats counted_;
   std::string trouble_;
@@ -133,7 +134,7 @@ class LocalSource : public PvsSource {
 Catalogue catalogue_of(const Scene& scene, const Reach& reach, const Method& method) {
   Catalogue c;
   c.scene_hash = scene.hash;
-  c.reach = reach.to_string();
+  c.reaches = {reach};
   c.method = method.traits().name;
   for (const Object& o : scene.objects) {
     c.node.push_back(o.node);

@@ -72,15 +72,20 @@ struct NetworkSource::Impl {
     }
     if (session == 0) {
       if (now >= next_hello &&
-          put(wire::Hello{wire::kProtocolVersion, scene_hash, options.reach, true}))
+          put(wire::Hello{wire::kProtocolVersion, scene_hash, options.reach, true, options.pace,
+                          options.strategy, options.budget_us})) {
         next_hello = now + kHelloAgain;
+        pace_due = false;
+      }
       return;
     }
+    // Before the pose: it is answered by the new pace.
+    if (pace_due) pace_due = !put(wire::PaceMessage{session, options.pace});
     if (!pose_due) return;
     if (!waiting_since) waiting_since = now;  // also while the pose cannot leave
     const Eye& eye = eyes[sequence % kRememberedEyes];
     // What is not known as a base is not acknowledged: the answer then is a full set.
-    if (!put(wire::PoseMessage{session, sequence, history.newest(), eye.at})) return;
+    if (!put(wire::PoseMessage{session, sequence, history.newest(), eye.at, hold_us})) return;
     pose_due = false;
   }
 
@@ -149,9 +154,12 @@ struct NetworkSource::Impl {
           "the client's scene has the hash " + to_hex(scene_hash) + ", the server's " +
           to_hex(w.scene_hash) +
           (w.table.cluster.empty() ? "" : ", which is split into clusters (granularity cluster)")));
-    auto reach_served = Reach::parse(w.reach);
-    if (w.session == 0 || !reach_served || w.table.id.size() != w.objects ||
-        w.table.node.size() != w.objects || w.table.instance.size() != w.objects ||
+    std::vector<Reach> reaches;
+    for (const std::string& text : w.reaches)
+      if (auto reach = Reach::parse(text)) reaches.push_back(*reach);
+    if (w.session == 0 || reaches.empty() || reaches.size() != w.reaches.size() ||
+        w.table.id.size() != w.objects || w.table.node.size() != w.objects ||
+        w.table.instance.size() != w.objects ||
         (!w.table.cluster.empty() && w.table.cluster.size() != w.objects)) {
       ++counted.bad_messages;
       last_trouble = "a Welcome that contradicts itself";
@@ -159,7 +167,7 @@ struct NetworkSource::Impl {
     }
     Catalogue told;
     told.scene_hash = w.scene_hash;
-    told.reach = w.reach;
+    told.reaches = std::move(reaches);
     told.method = w.method;
     told.node.resize(w.objects);
     told.instance.resize(w.objects);
@@ -181,7 +189,6 @@ struct NetworkSource::Impl {
     if (catalogue && was_lost) ++counted.reconnects;
     catalogue = std::move(told);
     id_of = std::move(w.table.id);
-    reach = *reach_served;
     scene_hash = w.scene_hash;
     session = w.session;
     history.clear();
@@ -221,7 +228,10 @@ struct NetworkSource::Impl {
     };
     Answer a;
     a.sequence = m.sequence;
-    a.cell = {m.eye.value_or(eye.at), reach};
+    if (m.rung >= catalogue->reaches.size())
+      return bad("a PVS for a reach that the server has not named");
+    a.cell = {m.eye.value_or(eye.at), catalogue->reaches[m.rung]};
+    a.safe = static_cast<double>(m.safe) / wire::PvsMessage::kAllSafe;
     a.solve_ms = m.solve_us / 1000.0;
     a.everything = m.everything;
     if (m.everything) {
@@ -257,15 +267,16 @@ struct NetworkSource::Impl {
   SceneHash scene_hash;
   std::optional<Catalogue> catalogue;
   std::vector<ObjectId> id_of;  ///< by rank
-  Reach reach;
-  std::uint64_t session = 0;  ///< 0: greeting
+  std::uint64_t session = 0;    ///< 0: greeting
   Clock::time_point next_hello{};
   std::optional<Clock::time_point>
       waiting_since;  ///< last sign of life with a pose due or unanswered
   std::array<Eye, kRememberedEyes> eyes{};
   std::uint32_t sequence = 0;  ///< of the latest pose
   std::uint32_t answered = 0;  ///< of the latest pose that was
+  std::uint32_t hold_us = 0;   ///< likewise
   bool pose_due = false;
+  bool pace_due = false;
   PvsHistory history;
   std::optional<wire::PvsMessage> newest;
   std::optional<Answer> ready;
@@ -297,11 +308,18 @@ const Catalogue* NetworkSource::catalogue() const {
   return impl_->catalogue ? &*impl_->catalogue : nullptr;
 }
 
-void NetworkSource::send(std::uint32_t sequence, const Vec3& eye) {
-  impl_->sequence = sequence;
-  impl_->eyes[sequence % kRememberedEyes] = {sequence, eye};
+void NetworkSource::send(const Request& request) {
+  impl_->sequence = request.sequence;
+  impl_->hold_us = request.hold_us;
+  impl_->eyes[request.sequence % kRememberedEyes] = {request.sequence, request.centre};
   impl_->pose_due = true;
   impl_->pump();
+}
+
+void NetworkSource::set_pace(const Pace& pace) {
+  if (pace == impl_->options.pace) return;
+  impl_->options.pace = pace;
+  impl_->pace_due = true;
 }
 
 bool NetworkSource::receive(Answer& answer) {

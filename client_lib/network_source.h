@@ -2,16 +2,21 @@
 
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "client_lib/source.h"
+#include "core/strategy.h"
 
 namespace ivis::client {
 
 struct NetworkOptions {
   std::string endpoint;
   SceneHash scene_hash = 0;                 ///< 0: whatever the server has; held to from then on
-  std::string reach;                        ///< empty: the server's
+  std::string reach;                        ///< of every cell; empty: the server chooses
+  Pace pace;                                ///< what it chooses by
+  std::optional<Strategy> strategy;         ///< none: the server's
+  std::uint32_t budget_us = 0;              ///< of one solve; 0: the server's
   std::chrono::milliseconds silence{2000};  ///< unanswered for so long: greet anew
 };
 
@@ -25,7 +30,8 @@ class NetworkSource : public PvsSource {
   ~NetworkSource() override;
 
   const Catalogue* catalogue() const override;
-  void send(std::uint32_t sequence, const Vec3& eye) override;
+  void send(const Request& request) override;
+  void set_pace(const Pace& pace) override;
   bool receive(Answer& answer) override;
   void wait(Time deadline) override;
   bool connected() const override;

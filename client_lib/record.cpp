@@ -1,9 +1,11 @@
 #include "client_lib/record.h"
 
 #include <array>
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "core/path.h"
 
@@ -11,7 +13,7 @@ namespace ivis::client {
 namespace {
 
 constexpr std::size_t kMaxRecordBytes = std::size_t{2} << 30U;
-constexpr std::string_view kMagic = "ivis-record 1";
+constexpr std::string_view kMagic = "ivis-record 2";
 
 template <class N>
 void put(std::string& out, N v) {
@@ -92,31 +94,78 @@ Result<RecordedFrame> frame(std::string_view line, const Record& record) {
   Words words(line);
   if (words.next() != "frame") return input_error("found " + shown(line) + ", expected 'frame'");
   RecordedFrame f;
-  f.pvs.scene_hash = record.scene_hash;
-  f.pvs.cell.reach = record.reach;
-  auto cell_eye = point(words, "the cell's eye");
-  if (!cell_eye) return cell_eye.error();
-  f.pvs.cell.eye = *cell_eye;
+  std::string_view word = words.next();
+  const auto time = number<double>(word);
+  if (!time || !std::isfinite(*time))
+    return input_error("the time: found " + shown(word) + ", expected a finite number");
+  f.time_s = *time;
+  word = words.next();
+  const auto sequence = number<std::uint32_t>(word);
+  if (!sequence) return input_error("the sequence: found " + shown(word) + ", expected a number");
+  f.sequence = *sequence;
+  auto centre = point(words, "the cell's eye");
+  if (!centre) return centre.error();
+  auto reach = Reach::parse(words.next());
+  if (!reach) return reach.error();
+  if (!record.reach.contains(*reach, kReachToleranceM))
+    return input_error("a cell of " + reach->to_string() + ", more than the record's " +
+                       record.reach.to_string());
+  f.cell = {*centre, *reach};
+  auto wanted = point(words, "the wanted eye");
+  if (!wanted) return wanted.error();
+  f.wanted = *wanted;
   auto eye = point(words, "the eye");
   if (!eye) return eye.error();
   f.eye = *eye;
-  const std::string_view covered = words.next();
-  if (covered != "covered" && covered != "uncovered")
-    return input_error("found " + shown(covered) + ", expected 'covered' or 'uncovered'");
-  f.covered = covered == "covered";
+  word = words.next();
+  if (word != "covered" && word != "uncovered")
+    return input_error("found " + shown(word) + ", expected 'covered' or 'uncovered'");
+  f.covered = word == "covered";
+  word = words.next();
+  const auto cause = number<std::uint8_t>(word);
+  if (!cause) return input_error("the cause: found " + shown(word) + ", expected a small number");
+  f.cause = *cause;
   if (words.rest() == "everything") {
     f.everything = true;
-    f.pvs.everything_because = "told so";
     return f;
   }
-  if (f.covered && !f.pvs.cell.contains(f.eye))
+  if (f.covered && !f.cell.contains(f.eye))
     return input_error("a covered frame whose eye is outside its cell");
-  if (auto read = ids(words, record.objects, f.pvs.objects); !read) return read.error();
+  if (auto read = ids(words, record.objects, f.changed); !read) return read.error();
   if (!words.done()) return input_error("found " + shown(words.rest()) + " after the last id");
   return f;
 }
 
 }  // namespace
+
+void Recorder::add(RecordedFrame frame, std::span<const std::uint64_t> visible) {
+  frame.changed.clear();
+  if (!frame.everything) {
+    last_.resize(visible.size());
+    for (std::size_t w = 0; w < visible.size(); ++w)
+      for (std::uint64_t left = last_[w] ^ visible[w]; left != 0; left &= left - 1)
+        frame.changed.push_back(
+            static_cast<ObjectId>(w * 64 + static_cast<std::size_t>(std::countr_zero(left))));
+    last_.assign(visible.begin(), visible.end());
+  }
+  record_.frames.push_back(std::move(frame));
+}
+
+RecordedSets::RecordedSets(const Record& record) : record_(record), visible_(record.objects) {}
+
+Pvs RecordedSets::at(std::size_t frame) {
+  for (; next_ <= frame; ++next_)
+    for (const ObjectId id : record_.frames[next_].changed)
+      visible_[id] = !visible_[id];
+  const RecordedFrame& f = record_.frames[frame];
+  Pvs pvs;
+  pvs.cell = f.cell;
+  pvs.scene_hash = record_.scene_hash;
+  if (f.everything) pvs.everything_because = "told so";
+  for (ObjectId id = 0; id < record_.objects; ++id)
+    if (f.everything || visible_[id]) pvs.objects.push_back(id);
+  return pvs;
+}
 
 std::string encode_record(const Record& record) {
   constexpr std::string_view kDigits = "0123456789abcdef";
@@ -128,21 +177,30 @@ std::string encode_record(const Record& record) {
   put(out, record.objects);
   out += '\n';
   for (const RecordedFrame& f : record.frames) {
-    out += "frame";
-    for (const Vec3& p : {f.pvs.cell.eye, f.eye}) {
+    const auto put_point = [&](const Vec3& p) {
       for (int k = 0; k < 3; ++k) {
         out += ' ';
         put(out, p[k]);
       }
-    }
+    };
+    out += "frame ";
+    put(out, f.time_s);
+    out += ' ';
+    put(out, f.sequence);
+    put_point(f.cell.eye);
+    out += ' ' + f.cell.reach.to_string();
+    put_point(f.wanted);
+    put_point(f.eye);
     out += f.covered ? " covered " : " uncovered ";
+    put(out, static_cast<unsigned>(f.cause));
+    out += ' ';
     if (f.everything) {
       out += "everything\n";
       continue;
     }
-    put(out, f.pvs.objects.size());
+    put(out, f.changed.size());
     ObjectId before = 0;
-    for (const ObjectId id : f.pvs.objects) {
+    for (const ObjectId id : f.changed) {
       out += ' ';
       put(out, id - before);
       before = id;

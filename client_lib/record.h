@@ -1,16 +1,20 @@
 #pragma once
-// What a walk was told, kept for `ivis verify --record`.
+// What a walk was told and drew, kept for `ivis verify --record` and `ivis replay`.
 //
 // Text, a line each, numbers in the shortest form that reads back to the same bits:
-//   ivis-record 1
+//   ivis-record 2
 //   scene <hash, 16 hex digits>
-//   reach <reach of every cell, e.g. disc:1>
+//   reach <the largest reach that cells may have, e.g. disc:1>
 //   objects <N>
-//   frame <cell x> <y> <z> <eye x> <y> <z> covered|uncovered everything
-//   frame <cell x> <y> <z> <eye x> <y> <z> covered|uncovered <count> <first id> <gap> <gap> ...
-// A gap is the difference to the id before it. `eye` is where the renderer drew from.
+//   frame <time> <sequence> <cell x> <y> <z> <cell's reach> <wanted x> <y> <z> <eye x> <y> <z>
+//         covered|uncovered <cause> everything
+//   frame ... covered|uncovered <cause> <count> <first id> <gap> <gap> ...
+// (a frame is one line). The ids are those whose visibility differs from the last frame that listed
+// any, at first from nothing; a gap is the difference to the id before it.
 
+#include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -21,13 +25,18 @@ namespace ivis::client {
 
 /// One frame of a walk.
 struct RecordedFrame {
-  Vec3 eye{0};  ///< drawn from; in pvs.cell when covered
+  double time_s = 0;           ///< since the first frame
+  std::uint32_t sequence = 0;  ///< of the pose whose PVS was in use; 0: none
+  ViewCell cell;               ///< of that PVS
+  Vec3 wanted{0};              ///< where the observer meant to be
+  Vec3 eye{0};                 ///< drawn from; in `cell` when covered, but for an everything
   bool covered = false;
-  bool everything =
-      false;  ///< every object was visible; pvs.objects is then empty, unlike elsewhere
-  Pvs pvs;    ///< with its cell and the scene's hash
+  bool everything = false;        ///< every object was visible
+  std::uint8_t cause = 0;         ///< ivis_cause: why `wanted` was outside the cell
+  std::vector<ObjectId> changed;  ///< ascending; empty when everything
 };
 
+/// `frames[i].changed` is against the frames before: a Recorder writes and RecordedSets reads them.
 struct Record {
   SceneHash scene_hash = 0;
   Reach reach;
@@ -35,9 +44,35 @@ struct Record {
   std::vector<RecordedFrame> frames;
 };
 
+/// Fills a record frame by frame. Ownership: borrows it.
+class Recorder {
+ public:
+  explicit Recorder(Record& record) : record_(record) {}
+  /// `visible`: bits by id, as many words as the objects take; ignored when everything is.
+  void add(RecordedFrame frame, std::span<const std::uint64_t> visible);
+
+ private:
+  Record& record_;
+  std::vector<std::uint64_t> last_;
+};
+
+/// The sets of a record, first to last. Ownership: borrows it.
+class RecordedSets {
+ public:
+  explicit RecordedSets(const Record& record);
+  /// The PVS in use at a frame, not before the one asked for last: of an everything all objects.
+  Pvs at(std::size_t frame);
+
+ private:
+  const Record& record_;
+  std::size_t next_ = 0;
+  std::vector<bool> visible_;
+};
+
 std::string encode_record(const Record& record);
 /// Untrusted text. Errors: kInput naming `name`, line, what was found and expected; a covered frame
-/// whose eye is outside its cell is one of them. Memory: a small multiple of the text.
+/// whose eye is outside its cell is one of them, and a cell larger than the record's reach.
+/// Memory: a small multiple of the text.
 Result<Record> decode_record(std::string_view text, const std::string& name);
 
 /// The file appears whole or not at all. Errors: kIo.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/ids.h"
+#include "core/pace.h"
 #include "core/result.h"
 #include "core/view_cell.h"
 
@@ -22,7 +23,7 @@ inline std::size_t words_for(std::size_t objects) {
 /// What is served: the same for as long as a client lives, but for the reach.
 struct Catalogue {
   SceneHash scene_hash = 0;
-  std::string reach;
+  std::vector<Reach> reaches;  ///< what cells may be, ascending
   std::string method;
   std::vector<std::uint32_t> node;      ///< by id
   std::vector<std::uint32_t> instance;  ///< by id
@@ -43,6 +44,14 @@ struct Answer {
   IdBits bits;
   std::uint32_t count = 0;  ///< of bits set
   double solve_ms = 0;
+  double safe = 1;  ///< the part of the pace told that the cell holds for the time asked for
+};
+
+/// A pose to be answered.
+struct Request {
+  std::uint32_t sequence = 0;
+  Vec3 centre{0};             ///< of the cell
+  std::uint32_t hold_us = 0;  ///< for how long the PVS should hold; 0: unknown
 };
 
 struct SourceStats {
@@ -61,7 +70,9 @@ class PvsSource {
   /// Null until the source knows what is served; then valid as long as the source.
   virtual const Catalogue* catalogue() const = 0;
   /// The latest pose replaces one that has not been sent. Sequences ascend from 1.
-  virtual void send(std::uint32_t sequence, const Vec3& eye) = 0;
+  virtual void send(const Request& request) = 0;
+  /// From now on, also for sessions to come. Valid: Pace::valid().
+  virtual void set_pace(const Pace& pace) = 0;
   /// Moves on whatever can be without waiting. Puts the newest answer into `answer` if there is one
   /// that has not been taken (swapping buffers), and returns whether it did.
   virtual bool receive(Answer& answer) = 0;

@@ -5,20 +5,33 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/context.h"
 #include "core/ids.h"
 #include "core/path.h"
 #include "core/result.h"
+#include "core/strategy.h"
 
 namespace ivis {
 
 struct WalkOptions {
   enum class Policy { kEverything, kStall, kIncomplete };
   Policy policy = Policy::kStall;
-  /// Poses a second. 0: as fast as answers come: each row waits for its own PVS before it is drawn.
+  /// Rows a second, a frame each. 0: as fast as answers come: each row waits for its own PVS.
   double hz = 0;
+  /// Frames a second of a walk in real time: the path is played by its times, interpolated, and the
+  /// observer's fastest speed is told to the server. Where the eye is held the walk waits. Excludes
+  /// hz.
+  double fps = 0;
+  /// With fps: how long, there and back again; 0: once along the path.
+  double seconds = 0;
+  /// With fps: the fastest horizontal speed, which is told and kept to; 0: the path's own.
+  double speed_limit_m_s = 0;
+  std::optional<Strategy> strategy;                  ///< none: the server's
+  double budget_ms = 0;                              ///< of one solve; 0: the server's
+  bool predict = false;                              ///< centre cells where the observer is going
   std::optional<std::filesystem::path> record_file;  ///< client_lib/record.h
   SceneHash scene_hash = 0;                          ///< 0: the server's
   std::string reach;                                 ///< empty: the server's
@@ -51,6 +64,17 @@ struct WalkReport {
   double solve_ms_p50 = 0;     ///< visibility time at the server
   double overhead_ms_p50 = 0;  ///< round trip less visibility time, pose by pose
   double pvs_median = 0;       ///< objects
+  double reach_median = 0;     ///< metres, horizontally, of the cells in use
+  double held_m = 0;           ///< by which eyes were held back, summed over frames
+  double age_ms_p99 = 0;       ///< of the PVS in use, since its pose
+  double margin_m_p01 =
+      0;  ///< from covered eyes to the border of their cell: one in a hundred is nearer
+  double latency_ms = 0;  ///< L, T and L + T - frame, as ivis_stats
+  double interval_ms = 0;
+  double hold_ms = 0;
+  std::uint64_t frames = 0;
+  /// Frames whose eye was outside the cell, by cause; those that were.
+  std::vector<std::pair<std::string, std::uint64_t>> causes;
   std::uint32_t objects = 0;
   std::string reach;
   std::string method;

@@ -12,6 +12,7 @@
 
 #include "core/path.h"
 #include "core/reach.h"
+#include "server/ladder.h"
 
 namespace ivis::server {
 namespace {
@@ -117,6 +118,19 @@ Status set_level(Config& c, const std::string& text) {
   return ok();
 }
 
+/// Whether it fits the reach is known when that is.
+Status set_ladder(Config& c, const std::string& text) {
+  if (auto parsed = parse_ladder(text, Reach::box(Vec3{1e6}), 0); !parsed) return parsed.error();
+  c.ladder = text;
+  return ok();
+}
+Status set_strategy(Config& c, const std::string& text) {
+  const auto strategy = parse_strategy(text);
+  if (!strategy)
+    return invalid_argument("found '" + text + "', expected guaranteed, abort or predictive");
+  c.strategy = *strategy;
+  return ok();
+}
 Status set_method(Config& c, const std::string& text) {
   c.method = text;
   return ok();
@@ -144,6 +158,12 @@ const std::vector<Key>& keys() {
        Kind::kText,
        get_text(&Config::reach),
        set_reach},
+      {{"ladder", "R...",
+        "smaller reaches, ascending, for observers that say how fast they move: 'auto' makes four "
+        "of the reach, 'none' none"},
+       Kind::kText,
+       get_text(&Config::ladder),
+       set_ladder},
       {{"listen", "ADDRESS", "tcp://HOST:PORT or ipc://PATH"},
        Kind::kText,
        get_text(&Config::listen),
@@ -152,6 +172,16 @@ const std::vector<Key>& keys() {
        Kind::kText,
        get_text(&Config::method),
        set_method},
+      {{"strategy", "NAME",
+        "how solves keep to their time, where a client does not say: guaranteed (all there is), "
+        "abort (stop drawing), predictive (choose before drawing); each set is complete"},
+       Kind::kText,
+       [](const Config& c) -> std::string { return ivis::to_string(c.strategy); },
+       set_strategy},
+      {{"budget_us", "US", "of one solve, for abort and predictive, 1 to 1000000"},
+       Kind::kNumber,
+       get_number(&Config::budget_us),
+       set_number(&Config::budget_us, 1, 1'000'000)},
       {{"threads", "N", "threads inside one solve, 1 to 256"},
        Kind::kNumber,
        get_number(&Config::threads),
@@ -176,6 +206,11 @@ const std::vector<Key>& keys() {
        Kind::kNumber,
        get_number(&Config::idle_timeout_s),
        set_number(&Config::idle_timeout_s, 1, 86400)},
+      {{"least_solve_ms", "MS",
+        "a solve takes at least so long, 0 to 10000: to try out a server that is slow"},
+       Kind::kNumber,
+       get_number(&Config::least_solve_ms),
+       set_number(&Config::least_solve_ms, 0, 10000)},
   };
   return all;
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/result.h"
+#include "core/strategy.h"
 #include "scenes/clusters.h"
 #include "server/log.h"
 
@@ -20,15 +21,19 @@ struct Config {
   std::filesystem::path scene;
   std::filesystem::path occluders;  ///< empty: shrink at start
   Granularity granularity = Granularity::kObject;
-  std::string reach;  ///< empty: the occluder file's, or kDefaultReach
+  std::string reach;            ///< empty: the occluder file's, or kDefaultReach
+  std::string ladder = "auto";  ///< of smaller reaches: parse_ladder()
   std::string listen = "tcp://127.0.0.1:7447";
-  std::string method;    ///< empty: the first of method_list()
-  unsigned threads = 1;  ///< inside one solve
+  Strategy strategy = Strategy::kGuaranteed;  ///< SessionLimits::strategy
+  unsigned budget_us = 1000;                  ///< SessionLimits::budget_ms
+  std::string method;                         ///< empty: the first of method_list()
+  unsigned threads = 1;                       ///< inside one solve
   LogLevel log_level = LogLevel::kInfo;
   bool json_logs = false;
   bool busy_poll = false;
   std::size_t max_clients = 256;
   unsigned idle_timeout_s = 60;
+  unsigned least_solve_ms = 0;  ///< SessionLimits::least_solve
 };
 inline constexpr std::string_view kDefaultReach = "cylinder:1.5,0.1";
 

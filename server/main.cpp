@@ -8,6 +8,8 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <thread>
+#include <utility>
 
 #include <unistd.h>
 
@@ -143,7 +145,7 @@ int serve(const Config& config) {
     if (world.error().code == ErrorCode::kCancelled) return kOk;
     return report(world.error());
   }
-  const World& w = **world;
+  World& w = **world;
   for (const std::string& warning : w.scene.warnings)
     log.warn("scene", {{"warning", warning}});
   log.info("loaded", {{"scene", config.scene.string()},
@@ -157,19 +159,44 @@ int serve(const Config& config) {
     return report(input_error("'" + config.scene.string() + "' has " +
                               std::to_string(w.scene.object_count()) +
                               " objects, more than a message can name"));
-  const ServedScene served = served_scene(w.scene, w.occluders);
+  auto reaches = parse_ladder(config.ladder, w.reach, w.occluders.slack_m);
+  if (!reaches) return report(reaches.error());
+  Ladder ladder(std::move(*reaches), *w.method, w.occluders.slack_m);
+  const ServedScene served = served_scene(w.scene);
   ServerOptions options;
   options.listen = config.listen;
   options.busy_poll = config.busy_poll;
   options.limits.max_sessions = config.max_clients;
   options.limits.idle = std::chrono::seconds(config.idle_timeout_s);
-  auto server = Server::bind(options, served, *w.method, w.reach, log);
+  options.limits.least_solve = std::chrono::milliseconds(config.least_solve_ms);
+  options.limits.strategy = config.strategy;
+  options.limits.budget_ms = config.budget_us / 1000.0;
+  if (!w.method->keeps_to_effort() && config.strategy != Strategy::kGuaranteed)
+    log.warn("strategy", {{"strategy", to_string(config.strategy)},
+                          {"reason", w.method->traits().name + " keeps to no budget"}});
+  const CostModel cost = calibrate(*w.method, w.scene, w.reach, &stop_requested);
+  if (w.method->keeps_to_effort())
+    log.info("calibrated", {{"fixed_ms", cost.fixed_ms},
+                            {"draw_us", 1e3 * cost.draw_ms},
+                            {"test_us", 1e3 * cost.test_ms}});
+  auto server = Server::bind(options, served, ladder, log, cost);
   if (!server) {
     report(server.error());
     return kConnection;
   }
   log.info("listening", {{"address", (*server)->endpoint()}});
+  std::thread builder([&] {
+    Context quiet;
+    quiet.stop = &stop_requested;
+    const auto built = build_rungs(w, ladder, wanted, quiet);
+    if (built && ladder.reaches().size() > 1)
+      log.info("ladder", {{"rungs", ladder.ready()}});
+    else if (!built && built.error().code != ErrorCode::kCancelled)
+      log.warn("ladder", {{"rungs", ladder.ready()}, {"reason", built.error().message}});
+  });
   (*server)->run(stop_requested);
+  stop_requested = true;
+  builder.join();
   return kOk;
 }
 

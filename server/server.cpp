@@ -42,11 +42,11 @@ Error explain(const zmq::error_t& e, const std::string& listen) {
 }  // namespace
 
 struct Server::Impl {
-  Impl(const ServerOptions& o, const ServedScene& scene, const Method& method, const Reach& reach,
-       Log& l)
+  Impl(const ServerOptions& o, const ServedScene& scene, const Ladder& ladder, Log& l,
+       const CostModel& cost)
       : options(o),
         log(l),
-        sessions(scene, method, reach, o.limits),
+        sessions(scene, ladder, o.limits, cost),
         context(1),
         socket(context, zmq::socket_type::router) {}
 
@@ -152,10 +152,11 @@ const SessionCounters& Server::counters() const {
 }
 
 Result<std::unique_ptr<Server>> Server::bind(const ServerOptions& options, const ServedScene& scene,
-                                             const Method& method, const Reach& reach, Log& log) {
+                                             const Ladder& ladder, Log& log,
+                                             const CostModel& cost) {
   if (auto claimed = claim_address(options.listen); !claimed) return claimed.error();
   try {
-    auto impl = std::make_unique<Impl>(options, scene, method, reach, log);
+    auto impl = std::make_unique<Impl>(options, scene, ladder, log, cost);
     impl->configure();
     impl->socket.bind(options.listen);
     impl->endpoint = plain_endpoint(impl->socket.get(zmq::sockopt::last_endpoint));
@@ -205,6 +206,8 @@ void Server::run(const std::atomic<bool>& stop) {
                         {"poses", c.poses},
                         {"answers", c.answers},
                         {"superseded", c.superseded},
+                        {"beyond_ladder", c.beyond_ladder},
+                        {"cut_short", c.cut_short},
                         {"refused", c.refused},
                         {"malformed", c.malformed},
                         {"dropped", s.dropped},

@@ -22,15 +22,15 @@ Status probe_address(const std::string& listen);
 
 /// The socket around a SessionTable: one thread that takes in everything that waits, then answers
 /// one client, and so on; it never blocks on a client. Threads:   bind() and run() from one thread;
-/// `stop` may be set from any, and from a signal handler. Ownership: borrows scene, method and log.
+/// `stop` may be set from any, and from a signal handler. Ownership: borrows scene, ladder and log.
 class Server {
  public:
   /// Errors: kConnection when the address is taken by a live server or cannot be had;
   /// kInvalidArgument for one that is not an address. An ipc path that a dead server left behind is
   /// taken over.
   static Result<std::unique_ptr<Server>> bind(const ServerOptions& options,
-                                              const ServedScene& scene, const Method& method,
-                                              const Reach& reach, Log& log);
+                                              const ServedScene& scene, const Ladder& ladder,
+                                              Log& log, const CostModel& cost = {});
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

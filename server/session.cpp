@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <thread>
 #include <utility>
 
 #define XXH_INLINE_ALL
@@ -38,11 +39,10 @@ std::string why_another(const ServedScene& scene, SceneHash hash) {
 
 }  // namespace
 
-ServedScene served_scene(const Scene& scene, const OccluderSet& occluders) {
+ServedScene served_scene(const Scene& scene) {
   ServedScene served;
   served.hash = scene.hash;
   served.whole_hash = scene.whole_hash;
-  served.slack_m = occluders.slack_m;
   wire::ObjectTable table;
   table.id = rank_order(scene);
   served.order_hash = XXH3_64bits(table.id.data(), table.id.size() * sizeof(ObjectId));
@@ -58,12 +58,12 @@ ServedScene served_scene(const Scene& scene, const OccluderSet& occluders) {
   return served;
 }
 
-SessionTable::SessionTable(const ServedScene& scene, const Method& method, const Reach& reach,
-                           SessionLimits limits)
+SessionTable::SessionTable(const ServedScene& scene, const Ladder& ladder, SessionLimits limits,
+                           const CostModel& cost)
     : scene_(scene),
-      method_(method),
-      reach_(reach),
+      ladder_(ladder),
       limits_(limits),
+      cost_(cost),
       ids_(seeded()),
       nothing_(scene.objects()) {}
 
@@ -76,6 +76,7 @@ std::optional<Outgoing> SessionTable::receive(std::string_view peer,
   }
   if (const auto* pose = std::get_if<wire::PoseMessage>(&*message)) return handle(peer, *pose, now);
   if (const auto* hello = std::get_if<wire::Hello>(&*message)) return handle(peer, *hello, now);
+  if (const auto* pace = std::get_if<wire::PaceMessage>(&*message)) return handle(peer, *pace, now);
   if (const auto* bye = std::get_if<wire::Bye>(&*message)) return handle(peer, *bye);
   ++counters_.malformed;
   return refuse(peer, 0, wire::Refusal::kMalformed, "a message that only a server sends");
@@ -100,14 +101,16 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
                                                 to_hex(scene_.hash) +
                                                 why_another(scene_, hello.scene_hash));
   Session session;
-  session.reach = reach_;
+  session.pace = hello.pace;
+  session.effort = cost_.effort(hello.strategy.value_or(limits_.strategy),
+                                hello.budget_us > 0 ? hello.budget_us / 1000.0 : limits_.budget_ms);
   if (!hello.reach.empty()) {
     const auto wanted = Reach::parse(hello.reach);
     if (!wanted) return turn_away(wire::Refusal::kReach, wanted.error().message);
-    if (!serves(reach_, scene_.slack_m, *wanted))
+    if (!serves(ladder_.largest(), ladder_.slack_m(), *wanted))
       return turn_away(wire::Refusal::kReach, "the client wants " + wanted->to_string() +
                                                   ", the server's occluders serve up to " +
-                                                  reach_.to_string());
+                                                  ladder_.largest().to_string());
     session.reach = *wanted;
   }
   if (known == sessions_.end() && sessions_.size() >= limits_.max_sessions)
@@ -146,6 +149,17 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
   if (session.pose) ++counters_.superseded;
   session.pose = pose;
   enqueue(peer, session);
+  return std::nullopt;
+}
+
+std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::PaceMessage& pace,
+                                             Time now) {
+  const auto found = sessions_.find(std::string(peer));
+  if (found == sessions_.end() || found->second.id != pace.session)
+    return refuse(peer, pace.session, wire::Refusal::kSession,
+                  "no such session here: say Hello again");
+  found->second.heard = now;
+  found->second.pace = pace.pace;
   return std::nullopt;
 }
 
@@ -196,10 +210,24 @@ std::vector<std::byte> SessionTable::welcome(Session& session) {
   w.scene_hash = scene_.hash;
   w.order_hash = scene_.order_hash;
   w.objects = scene_.objects();
-  w.reach = session.reach.to_string();
-  w.method = method_.traits().name;
+  if (session.reach) {
+    w.reaches.push_back(session.reach->to_string());
+  } else {
+    for (const Reach& r : ladder_.reaches())
+      w.reaches.push_back(r.to_string());
+  }
+  w.method = ladder_.largest_method().traits().name;
   if (!session.table_wanted) return wire::encode(w);
   return wire::encode(w, scene_.packed_table);
+}
+
+Ladder::Choice SessionTable::choose(const Session& session, std::uint32_t hold_us) const {
+  if (session.reach) {
+    Ladder::Choice choice = ladder_.choose(*session.reach);
+    choice.rung = 0;  // of the only one the client was told
+    return choice;
+  }
+  return ladder_.choose(session.pace, hold_us);
 }
 
 std::vector<std::byte> SessionTable::answer(Session& session) {
@@ -207,19 +235,29 @@ std::vector<std::byte> SessionTable::answer(Session& session) {
   session.pose.reset();
   ++counters_.answers;
 
+  const Ladder::Choice choice = choose(session, pose.hold_us);
+  const Reach& reach = session.reach ? *session.reach : ladder_.reaches()[choice.rung];
+  Work done;
   const auto start = std::chrono::steady_clock::now();
   const auto pvs = [&]() -> Result<Pvs> {
     try {
-      return method_.solve({pose.eye, session.reach});
+      if (session.effort.strategy == Strategy::kGuaranteed)
+        return choice.method->solve({pose.eye, reach});
+      return choice.method->solve({pose.eye, reach}, session.effort, done);
     } catch (const std::exception& e) {  // out of memory costs one answer, not the daemon
       return unsupported(e.what());
     }
   }();
+  if (limits_.least_solve.count() > 0) std::this_thread::sleep_until(start + limits_.least_solve);
   const auto took = std::chrono::steady_clock::now() - start;
 
   wire::PvsMessage m;
   m.session = session.id;
   m.sequence = pose.sequence;
+  m.rung = static_cast<std::uint16_t>(choice.rung);
+  m.safe = static_cast<std::uint16_t>(choice.safe * wire::PvsMessage::kAllSafe);
+  if (choice.safe < 1) ++counters_.beyond_ladder;
+  if (done.cut) ++counters_.cut_short;
   m.solve_us = static_cast<std::uint32_t>(std::min<std::int64_t>(
       std::chrono::duration_cast<std::chrono::microseconds>(took).count(), UINT32_MAX));
   if (!pvs) ++counters_.solve_errors;

@@ -16,6 +16,8 @@
 #include "core/reach.h"
 #include "occluders/occluder_set.h"
 #include "scenes/scene.h"
+#include "server/cost_model.h"
+#include "server/ladder.h"
 #include "visibility/method.h"
 #include "wire/messages.h"
 #include "wire/pvs_codec.h"
@@ -29,16 +31,19 @@ struct ServedScene {
   std::vector<std::uint8_t>
       packed_table;           ///< wire/object_table.h; goes into every Welcome as it is
   std::vector<Rank> rank_of;  ///< by id
-  double slack_m = 0;         ///< of the occluders: reaches are compared with it
   SceneHash whole_hash = 0;  ///< Scene::whole_hash: not `hash` when meshes were split into clusters
   std::uint32_t objects() const { return static_cast<std::uint32_t>(rank_of.size()); }
 };
 
-ServedScene served_scene(const Scene& scene, const OccluderSet& occluders);
+ServedScene served_scene(const Scene& scene);
 
 struct SessionLimits {
   std::size_t max_sessions = 256;
+  /// Of clients that wish for no other.
+  Strategy strategy = Strategy::kGuaranteed;
+  double budget_ms = 1;                      ///< of one solve
   std::chrono::milliseconds idle{60'000};    ///< silence after which a session is over
+  std::chrono::milliseconds least_solve{0};  ///< a solve takes no less: to try out a slow server
   std::size_t remembered_sets = 32;          ///< PVS a session that may become a base
   std::size_t remembered_bytes = 4U << 20U;  ///< of them; at least two are kept whatever their size
 };
@@ -53,7 +58,9 @@ struct SessionCounters {
   std::uint64_t answers = 0;
   std::uint64_t full_sets = 0;
   std::uint64_t solve_errors = 0;
-  std::uint64_t bytes_out = 0;  ///< of answers
+  std::uint64_t cut_short = 0;      ///< answers that left something undrawn or untested
+  std::uint64_t beyond_ladder = 0;  ///< answers whose cell holds less than the speeds told
+  std::uint64_t bytes_out = 0;      ///< of answers
 };
 
 /// A message and the peer it goes to.
@@ -65,16 +72,18 @@ struct Outgoing {
 /// The sessions of one server: takes messages in with receive(), hands out work a client at a time
 /// with work(). A later pose of a client replaces its earlier one; clients with something to answer
 /// take turns. An answer is coded against the newest PVS the client has acknowledged, so that any
-/// message may be lost. Threads:   one thread at a time. Ownership: borrows scene and method.
-/// Limits:    max_sessions, and per session remembered_bytes of sets; a full table refuses with
-/// kBusy.
+/// message may be lost. The cell is the smallest of the ladder that holds the observer for as long
+/// as it says a PVS is in use (docs/theory.md, 6). Threads:   one thread at a time. Ownership:
+/// borrows scene and ladder. Limits:    max_sessions, and per session remembered_bytes of sets; a
+/// full table refuses with kBusy.
 class SessionTable {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
-  /// `reach`: of a client that wants none of its own, and the largest one that may be asked for.
-  SessionTable(const ServedScene& scene, const Method& method, const Reach& reach,
-               SessionLimits limits);
+  /// The ladder's largest reach is the largest one that may be asked for.
+  /// `cost`: what makes budgets of milliseconds ones of work; not asked for kGuaranteed.
+  SessionTable(const ServedScene& scene, const Ladder& ladder, SessionLimits limits,
+               const CostModel& cost = {});
 
   /// Takes one message of `peer`; never fails: what is wrong comes back as a Refused to send.
   std::optional<Outgoing> receive(std::string_view peer, std::span<const std::byte> bytes,
@@ -101,7 +110,9 @@ class SessionTable {
   };
   struct Session {
     std::uint64_t id = 0;
-    Reach reach;
+    std::optional<Reach> reach;  ///< of every cell; none: the ladder's
+    Pace pace;
+    Effort effort;
     Time heard{};
     bool welcome_due = false;
     bool table_wanted = false;
@@ -114,19 +125,21 @@ class SessionTable {
 
   std::optional<Outgoing> handle(std::string_view peer, const wire::Hello& hello, Time now);
   std::optional<Outgoing> handle(std::string_view peer, const wire::PoseMessage& pose, Time now);
+  std::optional<Outgoing> handle(std::string_view peer, const wire::PaceMessage& pace, Time now);
   std::optional<Outgoing> handle(std::string_view peer, const wire::Bye& bye);
   Outgoing refuse(std::string_view peer, std::uint64_t session, wire::Refusal reason,
                   std::string text);
   std::vector<std::byte> welcome(Session& session);
   std::vector<std::byte> answer(Session& session);
+  Ladder::Choice choose(const Session& session, std::uint32_t hold_us) const;
   void remember(Session& session, std::uint32_t sequence, wire::PvsState state);
   void enqueue(std::string_view peer, Session& session);
   std::size_t remembered_limit() const;
 
   const ServedScene& scene_;
-  const Method& method_;
-  Reach reach_;
+  const Ladder& ladder_;
   SessionLimits limits_;
+  CostModel cost_;
   SessionCounters counters_;
   std::unordered_map<std::string, Session> sessions_;  ///< by peer
   std::deque<std::string> turn_;                       ///< peers with something to answer

@@ -21,6 +21,13 @@ Result<OccluderSet> shrink_here(const Scene& scene, const Reach& reach, const st
   return std::move(shrunk->set);
 }
 
+Result<std::unique_ptr<Method>> make(const std::string& method, const Scene& scene,
+                                     const OccluderSet& occluders, const WorldOptions& options) {
+  MethodOptions method_options;
+  method_options.threads = options.threads;
+  return make_method(method, scene, occluders, method_options);
+}
+
 }  // namespace
 
 Result<std::unique_ptr<World>> load_world(const WorldOptions& options, const Context& context) {
@@ -61,12 +68,27 @@ Result<std::unique_ptr<World>> load_world(const WorldOptions& options, const Con
     return fits.error();
   }
 
-  MethodOptions method_options;
-  method_options.threads = options.threads;
-  auto made = make_method(method, world->scene, world->occluders, method_options);
+  auto made = make(method, world->scene, world->occluders, options);
   if (!made) return made.error();
   world->method = std::move(*made);
   return world;
+}
+
+Status build_rungs(World& world, Ladder& ladder, const WorldOptions& options,
+                   const Context& context) {
+  const std::string method = world.method->traits().name;
+  for (std::size_t i = ladder.reaches().size() - 1; i-- > 0;) {
+    auto rung = std::make_unique<World::Rung>();
+    auto set = shrink_here(world.scene, ladder.reaches()[i], method, context);
+    if (!set) return set.error();
+    rung->occluders = std::move(*set);
+    auto made = make(method, world.scene, rung->occluders, options);
+    if (!made) return made.error();
+    rung->method = std::move(*made);
+    ladder.add(static_cast<std::uint32_t>(i), *rung->method);
+    world.rungs.push_back(std::move(rung));
+  }
+  return ok();
 }
 
 }  // namespace ivis::server

@@ -57,6 +57,9 @@ void add_path_options(CLI::App& app, StreetPathOptions& path) {
   app.add_option("--step", path.step_m, "metres between poses")
       ->capture_default_str()
       ->check(number_within(0.01, 100));
+  app.add_option("--speed", path.speed_m_s, "metres a second, for the column t")
+      ->capture_default_str()
+      ->check(number_within(0.01, 1000));
 }
 
 struct CityArgs {

@@ -129,14 +129,10 @@ Outcome verify_record(const VerifyArgs& args, const Context& context) {
   if (!occluders) return occluders.error();
   const Verifier verifier(*scene, &*occluders, blockers(args));
   Summary summary;
+  client::RecordedSets sets(*record);
   for (std::size_t row = 0; row < record->frames.size(); row += args.stride) {
-    const client::RecordedFrame& frame = record->frames[row];
-    Pvs pvs = frame.pvs;
-    if (!frame.covered) pvs.cell = {frame.eye, Reach::ball(0)};
-    if (frame.everything) {
-      pvs.objects.resize(scene->objects.size());
-      std::iota(pvs.objects.begin(), pvs.objects.end(), 0U);
-    }
+    Pvs pvs = sets.at(row);
+    if (!record->frames[row].covered) pvs.cell = {record->frames[row].eye, Reach::ball(0)};
     const auto report = verifier.check(pvs, verify_options(args), without_progress(context));
     if (!report) return report.error();
     summary.add(*report);

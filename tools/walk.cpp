@@ -18,6 +18,12 @@ struct WalkArgs {
   std::filesystem::path record;
   std::string reach;
   double hz = 0;
+  double fps = 0;
+  double seconds = 0;
+  double speed_limit = 0;
+  bool predict = false;
+  std::string strategy;
+  double budget_ms = 0;
   bool json = false;
 };
 
@@ -40,8 +46,15 @@ Outcome run_walk(const WalkArgs& args) {
   const auto path = read_path(args.path);
   if (!path) return path.error();
   WalkOptions options;
-  options.policy =
-      args.policy == "stall" ? WalkOptions::Policy::kStall : WalkOptions::Policy::kIncomplete;
+  options.policy = args.policy == "stall"      ? WalkOptions::Policy::kStall
+                   : args.policy == "show-all" ? WalkOptions::Policy::kEverything
+                                               : WalkOptions::Policy::kIncomplete;
+  options.fps = args.fps;
+  options.seconds = args.seconds;
+  options.speed_limit_m_s = args.speed_limit;
+  options.predict = args.predict;
+  options.strategy = parse_strategy(args.strategy);
+  options.budget_ms = args.budget_ms;
   options.hz = args.hz;
   options.reach = args.reach;
   if (!args.record.empty()) options.record_file = args.record;
@@ -49,6 +62,9 @@ Outcome run_walk(const WalkArgs& args) {
   if (!args.json && isatty(STDERR_FILENO) != 0) on_frame = live_line;
   const auto r = walk(args.endpoint, *path, options, context, on_frame);
   if (!r) return r.error();
+  nlohmann::json causes = nlohmann::json::object();
+  for (const auto& [cause, frames] : r->causes)
+    causes[cause] = frames;
   if (args.json) {
     print({{"poses", r->poses},
            {"stalls", r->stalls},
@@ -64,7 +80,18 @@ Outcome run_walk(const WalkArgs& args) {
            {"answers", r->answers},
            {"reconnects", r->reconnects},
            {"reach", r->reach},
-           {"method", r->method}});
+           {"method", r->method},
+           {"t_vis_ms_p50", r->round_trip_ms_p50},
+           {"t_vis_ms_p99", r->round_trip_ms_p99},
+           {"reach_median", r->reach_median},
+           {"held_m", r->held_m},
+           {"stall_causes", causes},
+           {"pvs_age_ms_p99", r->age_ms_p99},
+           {"margin_m_p01", r->margin_m_p01},
+           {"latency_ms", r->latency_ms},
+           {"interval_ms", r->interval_ms},
+           {"hold_ms", r->hold_ms},
+           {"frames", r->frames}});
     return kOk;
   }
   std::printf(
@@ -80,6 +107,15 @@ Outcome run_walk(const WalkArgs& args) {
       r->round_trip_ms_p50, r->round_trip_ms_p99, r->bytes_mean, r->bytes_median,
       static_cast<unsigned long long>(r->stalls),
       static_cast<unsigned long long>(r->uncovered_frames));
+  if (args.fps > 0)
+    std::printf(
+        "cells               %.2f m median reach, %.3f m left to the border (1 in 100 less)\n"
+        "a PVS is used       %.1f ms past its pose (L %.1f ms, T %.1f ms); its age %.1f ms p99\n",
+        r->reach_median, r->margin_m_p01, r->hold_ms, r->latency_ms, r->interval_ms, r->age_ms_p99);
+  if (r->stalls > 0) std::printf("held back           %.3f m in all\n", r->held_m);
+  for (const auto& [cause, frames] : r->causes)
+    std::printf("  outside the cell  %llu frames: %s\n", static_cast<unsigned long long>(frames),
+                cause.c_str());
   return kOk;
 }
 
@@ -94,14 +130,41 @@ void add_walk(CLI::App& app, std::function<Outcome()>& action) {
       ->type_name("E");
   sub->add_option("--path", args->path, "CSV of poses: columns x,y,z by name")->required();
   sub->add_option("--policy", args->policy,
-                  "outside the cell of the last PVS: stall there, or draw incomplete")
+                  "outside the cell of the last PVS: stall at its border, draw incomplete, or "
+                  "show all objects")
       ->capture_default_str()
-      ->check(CLI::IsMember({"stall", "incomplete"}));
-  sub->add_option("--reach", args->reach, "ask for a smaller reach than the server's")
+      ->check(CLI::IsMember({"stall", "incomplete", "show-all"}));
+  sub->add_option("--reach", args->reach,
+                  "cells of this reach, at most the server's (default: the server chooses)")
       ->type_name("R");
+  auto* fps = sub->add_option("--fps", args->fps,
+                              "walk in real time, so many frames a second: the path is played by "
+                              "its column t, and the server is told how fast that is")
+                  ->check(number_within(0, 1000));
+  sub->add_option("--seconds", args->seconds,
+                  "how long, there and back again (default: once along the path)")
+      ->needs(fps)
+      ->check(number_within(0, 1e6));
+  sub->add_option("--speed-limit", args->speed_limit,
+                  "walk no faster than this, and tell the server (default: the path's speed)")
+      ->needs(fps)
+      ->type_name("M_S")
+      ->check(number_within(0, 1e6));
+  sub->add_option("--strategy", args->strategy,
+                  "how the server keeps to its time: all there is, stop drawing, or choose before "
+                  "drawing (default: the server's)")
+      ->check(CLI::IsMember({"guaranteed", "abort", "predictive"}));
+  sub->add_option("--budget-ms", args->budget_ms,
+                  "of one solve, for the latter two (default: the server's)")
+      ->check(number_within(0, 1e6));
+  sub->add_flag("--predict", args->predict,
+                "centre cells where the observer is going instead of where it is")
+      ->needs(fps);
   sub->add_option("--hz", args->hz,
-                  "poses a second; 0: as fast as answers come, each pose waits for its own")
+                  "rows of the path a second; 0: as fast as answers come, each pose waits for its "
+                  "own")
       ->capture_default_str()
+      ->excludes(fps)
       ->check(number_within(0, 1000));
   sub->add_option("--record", args->record,
                   "write what the client was told, for 'ivis verify --record'");

@@ -97,6 +97,12 @@ CullMap::CullMap(const Scene& scene, const OccluderSet& occluders, const MethodO
   }
   objects_ = BoxTree::build(boxes, ids, origin_);
   for (const WallSet::Solid& s : walls_.solids) {
+    std::uint32_t corners = 0;
+    for (std::uint32_t r = 0; r < s.rings; ++r)
+      corners += walls_.rings[s.first_ring + r].count;
+    corners_.push_back(corners);
+  }
+  for (const WallSet::Solid& s : walls_.solids) {
     all_floored_ = all_floored_ && s.floored;
     all_grounded_ = all_grounded_ && s.grounded;
     all_held_down_ = all_held_down_ && (s.floored || s.grounded);
@@ -141,19 +147,39 @@ void CullMap::give_back(std::unique_ptr<Scratch> scratch) const {
 
 Result<Pvs> CullMap::solve(const ViewCell& cell) const {
   Stats stats;
-  return solve(cell, nullptr, stats);
+  return solve(cell, nullptr, {}, stats);
 }
 
 Result<Pvs> CullMap::solve(const ViewCell& cell, LastShown& last) const {
   Stats stats;
-  return solve(cell, &last, stats);
+  return solve(cell, &last, {}, stats);
+}
+
+Result<Pvs> CullMap::solve(const ViewCell& cell, const Effort& effort, Work& done) const {
+  Stats stats;
+  Effort bounded = effort;
+  if (effort.strategy == Strategy::kGuaranteed) bounded.draw = bounded.test = Effort::kUnbounded;
+  auto pvs = solve(cell, nullptr, bounded, stats);
+  done = {stats.polar.draw_work(), stats.polar.nodes_tested, stats.polar.cut};
+  return pvs;
 }
 
 Result<Pvs> CullMap::solve(const ViewCell& cell, Stats& stats) const {
-  return solve(cell, nullptr, stats);
+  return solve(cell, nullptr, {}, stats);
 }
 
-Result<Pvs> CullMap::solve(const ViewCell& cell, LastShown* last, Stats& stats) const {
+// A solid is painted at most once; each wall faces the eye or away, and is drawn at most once of
+// each kind. A chain has at least a wall and writes at most all bins.
+Work CullMap::most_work() const {
+  std::uint64_t walls = 0;
+  for (const std::uint32_t c : corners_)
+    walls += c;
+  const std::uint64_t bins = std::uint64_t{4} * bins_a_face_ / PolarMap::kBlock;
+  return {walls * (1 + bins) + 2 * walls_.tree.nodes.size(), objects_.nodes.size(), false};
+}
+
+Result<Pvs> CullMap::solve(const ViewCell& cell, LastShown* last, const Effort& effort,
+                           Stats& stats) const {
   if (auto checked = check_cell(cell, occluders_); !checked) return checked.error();
   Pvs pvs = empty_answer(scene_, cell);
   const Vec3 half = padded(cell.reach, occluders_.slack_m).half_extents();
@@ -184,33 +210,85 @@ Result<Pvs> CullMap::solve(const ViewCell& cell, LastShown* last, Stats& stats) 
 
   auto scratch = take_scratch();
   scratch->visible.clear();
-  if (auto drawn = draw_selected(eye, last, *scratch, stats); !drawn) return drawn.error();
-  find_objects(eye, *scratch, stats);
+  if (auto drawn = draw_selected(eye, last, effort, *scratch, stats); !drawn) return drawn.error();
+  find_objects(eye, effort, *scratch, stats);
   list_ascending(scene_.objects.size(), scratch->visible, always_visible_, scratch->bits, pvs);
   give_back(std::move(scratch));
   return pvs;
 }
 
 /// What MethodOptions::selection says. Drawing less is always safe.
-Status CullMap::draw_selected(const Eye& eye, LastShown* last, Scratch& scratch,
-                              Stats& stats) const {
+Status CullMap::draw_selected(const Eye& eye, LastShown* last, const Effort& effort,
+                              Scratch& scratch, Stats& stats) const {
+  if (effort.strategy == Strategy::kPredictive && !orthographic_)
+    return draw(eye, promising_solids(eye, effort.draw), effort, scratch, stats);
   if (last == nullptr || options_.selection == Selection::kConservative)
-    return draw(eye, largest_solids(eye, nullptr), scratch, stats);
-  auto drawn =
-      draw(eye, largest_solids(eye, last->known ? &last->occluders : nullptr), scratch, stats);
+    return draw(eye, largest_solids(eye, nullptr), effort, scratch, stats);
+  auto drawn = draw(eye, largest_solids(eye, last->known ? &last->occluders : nullptr), effort,
+                    scratch, stats);
   if (!drawn) return drawn;
   last->occluders.clear();
-  find(walls_.tree, eye, scratch, last->occluders, stats);
+  find(walls_.tree, eye, Effort::kUnbounded, scratch, last->occluders, stats);
   if (last->known && options_.selection == Selection::kTwoPass)
-    drawn = draw(eye, largest_solids(eye, &last->occluders), scratch, stats);
+    drawn = draw(eye, largest_solids(eye, &last->occluders), effort, scratch, stats);
   last->known = true;
   return drawn;
 }
 
-Status CullMap::draw(const Eye& eye, const Chosen& chosen, Scratch& scratch, Stats& stats) const {
+Status CullMap::draw(const Eye& eye, const Chosen& chosen, const Effort& effort, Scratch& scratch,
+                     Stats& stats) const {
   if (orthographic_) return draw_orthographic(eye, chosen, scratch);
-  draw_polar(eye, chosen, scratch, stats);
+  draw_polar(eye, chosen, effort, scratch, stats);
   return ok();
+}
+
+/// Those that promise to hide most for their work, until that is spent; near ones first (after
+/// Funkhouser and Séquin 1993). Hidden is worth the projected area; drawing costs corners, and bins
+/// by the width.
+CullMap::Chosen CullMap::promising_solids(const Eye& eye, std::uint64_t work) const {
+  struct Candidate {
+    float worth;  ///< area over work
+    float distance;
+    std::uint32_t solid;
+    std::uint32_t work;
+  };
+  std::vector<Candidate> all;
+  all.reserve(walls_.solids.size());
+  const auto bins = static_cast<float>(4 * bins_a_face_ / PolarMap::kBlock);
+  const float x = eye.single[0];
+  const float z = eye.single[2];
+  for (const BoxTree::Node& node : walls_.tree.nodes)
+    for (std::uint32_t c = 0; c < node.count; ++c) {
+      if ((node.child[c] & BoxTree::kItem) == 0) continue;
+      const std::uint32_t solid = node.child[c] & ~BoxTree::kItem;
+      const float dx = std::max({node.lo_x[c] - x, x - node.hi_x[c], 0.0F});
+      const float dz = std::max({node.lo_z[c] - z, z - node.hi_z[c], 0.0F});
+      const float d = std::max(std::sqrt(dx * dx + dz * dz), 0.1F);
+      const float width = std::hypot(node.hi_x[c] - node.lo_x[c], node.hi_z[c] - node.lo_z[c]);
+      const float turn = std::min(width / (6.2831853F * d), 1.0F);
+      const float cost = static_cast<float>(corners_[solid]) + bins * turn;
+      all.push_back({turn * (node.hi_y[c] - node.lo_y[c]) / (d * cost), d, solid,
+                     static_cast<std::uint32_t>(cost)});
+    }
+  const auto better = [](const Candidate& a, const Candidate& b) {
+    return a.worth != b.worth ? a.worth > b.worth : a.solid < b.solid;
+  };
+  // Only as many are sorted as the work may pay for.
+  std::size_t most = all.size();
+  if (work < most) most = static_cast<std::size_t>(work) + 1;
+  const auto end = all.begin() + static_cast<std::ptrdiff_t>(std::min(most, all.size()));
+  std::partial_sort(all.begin(), end, all.end(), better);
+  std::uint64_t spent = 0;
+  auto it = all.begin();
+  while (it != end && spent + it->work <= work)
+    spent += (it++)->work;
+  std::sort(all.begin(), it, [](const Candidate& a, const Candidate& b) {
+    return a.distance != b.distance ? a.distance < b.distance : a.solid < b.solid;
+  });
+  std::vector<std::uint32_t> chosen;
+  for (auto i = all.begin(); i != it; ++i)
+    chosen.push_back(i->solid);
+  return chosen;
 }
 
 /// The options_.max_occluders solids of largest projected area (width times height over distance
@@ -260,8 +338,8 @@ CullMap::Chosen CullMap::largest_solids(const Eye& eye,
   return chosen;
 }
 
-void CullMap::draw_polar(const Eye& eye, const Chosen& chosen, Scratch& scratch,
-                         Stats& stats) const {
+void CullMap::draw_polar(const Eye& eye, const Chosen& chosen, const Effort& effort,
+                         Scratch& scratch, Stats& stats) const {
   scratch.polar.clear();
   scratch.polar.set_horizon(nullptr);
   if (terrain_) {
@@ -269,9 +347,11 @@ void CullMap::draw_polar(const Eye& eye, const Chosen& chosen, Scratch& scratch,
     if (!scratch.horizon.empty()) scratch.polar.set_horizon(&scratch.horizon);
   }
   if (!chosen)
-    draw_walls(walls_, eye.single, eye.floors, {}, guards_, scratch.polar, stats.polar);
+    draw_walls(walls_, eye.single, eye.floors, {}, guards_, effort.draw, scratch.polar,
+               stats.polar);
   else if (!chosen->empty())
-    draw_walls(walls_, eye.single, eye.floors, *chosen, guards_, scratch.polar, stats.polar);
+    draw_walls(walls_, eye.single, eye.floors, *chosen, guards_, effort.draw, scratch.polar,
+               stats.polar);
   scratch.polar.finish(eye.floors.undersides);
 }
 
@@ -352,11 +432,12 @@ void CullMap::draw_here(const Eye& eye, const Chosen& chosen, Scratch& scratch) 
 }
 
 /// Appends the items of the tree that the finished map does not hide.
-void CullMap::find(const BoxTree& tree, const Eye& eye, Scratch& scratch,
+void CullMap::find(const BoxTree& tree, const Eye& eye, std::uint64_t most, Scratch& scratch,
                    std::vector<std::uint32_t>& found, Stats& stats) const {
   if (tree.nodes.empty()) return;
   if (!orthographic_) {
-    find_visible(tree, 0, eye.single, eye.floors.undersides, scratch.polar, found, stats.polar);
+    find_visible(tree, 0, eye.single, eye.floors.undersides, scratch.polar, most, found,
+                 stats.polar);
     return;
   }
   std::vector<std::uint32_t> stack{0};
@@ -374,9 +455,11 @@ void CullMap::find(const BoxTree& tree, const Eye& eye, Scratch& scratch,
   }
 }
 
-void CullMap::find_objects(const Eye& eye, Scratch& scratch, Stats& stats) const {
-  if (options_.threads <= 1 || orthographic_ || objects_.nodes.empty()) {
-    find(objects_, eye, scratch, scratch.visible, stats);
+void CullMap::find_objects(const Eye& eye, const Effort& effort, Scratch& scratch,
+                           Stats& stats) const {
+  if (options_.threads <= 1 || orthographic_ || objects_.nodes.empty() ||
+      effort.test != Effort::kUnbounded) {
+    find(objects_, eye, effort.test, scratch, scratch.visible, stats);
     return;
   }
   // The tree's upper levels alone, then each subtree as a task: the same tests as in one thread.
@@ -394,8 +477,8 @@ void CullMap::find_objects(const Eye& eye, Scratch& scratch, Stats& stats) const
       std::min(static_cast<int>(options_.threads), tbb::info::default_concurrency()));
   arena.execute([&] {
     tbb::parallel_for(std::size_t{0}, roots.size(), [&](std::size_t i) {
-      find_visible(objects_, roots[i], eye.single, eye.floors.undersides, scratch.polar, found[i],
-                   counts[i]);
+      find_visible(objects_, roots[i], eye.single, eye.floors.undersides, scratch.polar,
+                   Effort::kUnbounded, found[i], counts[i]);
     });
   });
   for (std::size_t i = 0; i < roots.size(); ++i) {

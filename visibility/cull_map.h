@@ -50,7 +50,12 @@ class CullMap : public Method {
   /// (docs/theory.md, 1).
   Result<Pvs> solve(const ViewCell& cell) const override;
   Result<Pvs> solve(const ViewCell& cell, LastShown& last) const override;
+  /// The polar map keeps to it. Of several threads one tests when testing is bounded.
+  Result<Pvs> solve(const ViewCell& cell, const Effort& effort, Work& done) const override;
+  bool keeps_to_effort() const override { return !orthographic_; }
   Result<Pvs> solve(const ViewCell& cell, Stats& stats) const;
+  /// No solve draws or tests more: all walls, near and far, each over all bins; all nodes.
+  Work most_work() const;
 
   static MethodTraits make_traits();
 
@@ -61,20 +66,25 @@ class CullMap : public Method {
   /// Solids to draw, in this order; nothing given: all that show.
   using Chosen = std::optional<std::vector<std::uint32_t>>;
 
-  Result<Pvs> solve(const ViewCell& cell, LastShown* last, Stats& stats) const;
+  Result<Pvs> solve(const ViewCell& cell, LastShown* last, const Effort& effort,
+                    Stats& stats) const;
   Chosen largest_solids(const Eye& eye, const std::vector<std::uint32_t>* among) const;
-  Status draw_selected(const Eye& eye, LastShown* last, Scratch& scratch, Stats& stats) const;
-  Status draw(const Eye& eye, const Chosen& chosen, Scratch& scratch, Stats& stats) const;
-  void draw_polar(const Eye& eye, const Chosen& chosen, Scratch& scratch, Stats& stats) const;
+  Chosen promising_solids(const Eye& eye, std::uint64_t work) const;
+  Status draw_selected(const Eye& eye, LastShown* last, const Effort& effort, Scratch& scratch,
+                       Stats& stats) const;
+  Status draw(const Eye& eye, const Chosen& chosen, const Effort& effort, Scratch& scratch,
+              Stats& stats) const;
+  void draw_polar(const Eye& eye, const Chosen& chosen, const Effort& effort, Scratch& scratch,
+                  Stats& stats) const;
   Status draw_orthographic(const Eye& eye, const Chosen& chosen, Scratch& scratch) const;
   Status draw_elsewhere(const Eye& eye, const Chosen& chosen, Scratch& scratch) const;
   void draw_here(const Eye& eye, const Chosen& chosen, Scratch& scratch) const;
   void add_chains(std::uint32_t solid, const Eye& eye, std::vector<ShadowChain>& chains) const;
   bool hidden_orthographic(const BoxTree::Node& node, std::uint32_t c, const Eye& eye,
                            const Scratch& scratch, bool finished) const;
-  void find(const BoxTree& tree, const Eye& eye, Scratch& scratch,
+  void find(const BoxTree& tree, const Eye& eye, std::uint64_t most, Scratch& scratch,
             std::vector<std::uint32_t>& found, Stats& stats) const;
-  void find_objects(const Eye& eye, Scratch& scratch, Stats& stats) const;
+  void find_objects(const Eye& eye, const Effort& effort, Scratch& scratch, Stats& stats) const;
   std::unique_ptr<Scratch> take_scratch() const;
   void give_back(std::unique_ptr<Scratch> scratch) const;
 
@@ -86,6 +96,7 @@ class CullMap : public Method {
   Vec3 origin_;
   BoxTree objects_;
   WallSet walls_;
+  std::vector<std::uint32_t> corners_;  ///< of each solid of walls_
   bool all_floored_ = true;
   bool all_grounded_ = true;
   bool all_held_down_ = true;  ///< floored or grounded

@@ -20,6 +20,10 @@ class CulledMethod : public Method {
   Result<Pvs> solve(const ViewCell& cell, LastShown& last) const final {
     return culled(method_->solve(cell, last), cell);
   }
+  Result<Pvs> solve(const ViewCell& cell, const Effort& effort, Work& done) const final {
+    return culled(method_->solve(cell, effort, done), cell);
+  }
+  bool keeps_to_effort() const final { return method_->keeps_to_effort(); }
 
  private:
   /// Takes out what need not be listed for the cell.

@@ -11,6 +11,7 @@
 #include "core/result.h"
 #include "occluders/occluder_set.h"
 #include "scenes/scene.h"
+#include "visibility/effort.h"
 
 namespace ivis {
 
@@ -107,6 +108,11 @@ class Method {
   /// The same for an observer whose last solve left `last`, which is brought up to date: what
   /// MethodOptions::selection goes by. Threads: reentrant, but not with one `last`.
   virtual Result<Pvs> solve(const ViewCell& cell, LastShown& /*last*/) const { return solve(cell); }
+  /// The same within a budget. A method that has none does all there is: keeps_to_effort().
+  virtual Result<Pvs> solve(const ViewCell& cell, const Effort& /*effort*/, Work& /*done*/) const {
+    return solve(cell);
+  }
+  virtual bool keeps_to_effort() const { return false; }
 };
 
 /// Traits of every registered method.

@@ -626,6 +626,7 @@ class WallPainter {
       add_layer<kUndersides>(map_, static_cast<std::size_t>(to), d, mine, s, w, b);
       pad = pad || to < static_cast<std::int32_t>(PolarMap::kPad);
     }
+    stats_.bins_written += static_cast<std::uint64_t>(last - first + 1);
     if (pad) map_.repeat_pad();
   }
 
@@ -651,8 +652,8 @@ View make_view(const float eye[3], const PolarMap& map) {
 
 template <bool kUndersides, bool kTerrain>
 void draw(const WallSet& walls, const float eye[3], const Floors& floors,
-          std::span<const std::uint32_t> only, const PolarGuards& guards, PolarMap& map,
-          PolarStats& stats) {
+          std::span<const std::uint32_t> only, const PolarGuards& guards, std::uint64_t most,
+          PolarMap& map, PolarStats& stats) {
   const View view = make_view(eye, map);
   WallPainter<kUndersides, kTerrain> painter(map, view, guards, stats);
   const auto paint = [&](std::uint32_t s) {
@@ -661,9 +662,13 @@ void draw(const WallSet& walls, const float eye[3], const Floors& floors,
     painter.paint(walls, solid, {solid.top - view.y, down ? -kInf : solid.bottom - view.y});
     ++stats.solids_drawn;
   };
+  // Drawing less is always safe.
+  const auto at_limit = [&] { return stats.draw_work() >= most && (stats.cut = true); };
   if (!only.empty()) {
-    for (const std::uint32_t s : only)
+    for (const std::uint32_t s : only) {
+      if (at_limit()) return;
       paint(s);
+    }
     return;
   }
   if (walls.tree.nodes.empty()) return;
@@ -677,6 +682,7 @@ void draw(const WallSet& walls, const float eye[3], const Floors& floors,
   stack.push_back({kInf, 0, {}, 0, -1});
   Seen seen;
   while (!stack.empty()) {
+    if (at_limit()) return;
     const Pending p = stack.back();
     stack.pop_back();
     // What was drawn since it was pushed may hide it now.
@@ -688,7 +694,7 @@ void draw(const WallSet& walls, const float eye[3], const Floors& floors,
       continue;
     }
     const BoxTree::Node& node = walls.tree.nodes[p.child];
-    ++stats.nodes_tested;
+    ++stats.nodes_searched;
     stats.solids_tested += node.count;
     std::uint32_t visible = visible_children<kUndersides, kTerrain>(node, view, map, false, seen);
     const std::uint32_t around = holds_eye(node, view);
@@ -735,7 +741,7 @@ void find_children(const BoxTree& tree, std::uint32_t root, const float eye[3], 
 
 template <bool kUndersides, bool kTerrain>
 void find(const BoxTree& tree, std::uint32_t root, const float eye[3], const PolarMap& map,
-          std::vector<std::uint32_t>& visible, PolarStats& stats) {
+          std::uint64_t most, std::vector<std::uint32_t>& visible, PolarStats& stats) {
   const View view = make_view(eye, map);
   std::uint32_t stack[BoxTree::kWidth * 12];
   std::uint32_t size = 0;
@@ -743,6 +749,16 @@ void find(const BoxTree& tree, std::uint32_t root, const float eye[3], const Pol
   Seen seen;
   while (size != 0) {
     const BoxTree::Node& node = tree.nodes[stack[--size]];
+    if (stats.nodes_tested >= most) {
+      stats.cut = true;
+      for (std::uint32_t c = 0; c < node.count; ++c) {
+        if ((node.child[c] & BoxTree::kItem) != 0)
+          visible.push_back(node.child[c] & ~BoxTree::kItem);
+        else
+          stack[size++] = node.child[c];
+      }
+      continue;
+    }
     step<kUndersides, kTerrain>(
         node, view, map, seen, stats, [&](std::uint32_t i) { visible.push_back(i); },
         [&](std::uint32_t n) { stack[size++] = n; });
@@ -758,16 +774,16 @@ void find_children_target(const BoxTree& tree, std::uint32_t root, const float* 
 
 void draw_walls_target(const WallSet& walls, const float* eye, const Floors& floors,
                        std::span<const std::uint32_t> only, const PolarGuards& guards,
-                       PolarMap& map, PolarStats& stats) {
+                       std::uint64_t most, PolarMap& map, PolarStats& stats) {
   choose(floors.undersides, map,
-         [&](auto u, auto t) { draw<u, t>(walls, eye, floors, only, guards, map, stats); });
+         [&](auto u, auto t) { draw<u, t>(walls, eye, floors, only, guards, most, map, stats); });
 }
 
 void find_visible_target(const BoxTree& tree, std::uint32_t root, const float* eye, bool undersides,
-                         const PolarMap& map, std::vector<std::uint32_t>& visible,
-                         PolarStats& stats) {
+                         const PolarMap& map, std::uint64_t most,
+                         std::vector<std::uint32_t>& visible, PolarStats& stats) {
   choose(undersides, map,
-         [&](auto u, auto t) { find<u, t>(tree, root, eye, map, visible, stats); });
+         [&](auto u, auto t) { find<u, t>(tree, root, eye, map, most, visible, stats); });
 }
 
 // A block's statement in layer k is the weakest of its bins' statements in layer k: it holds for
@@ -837,15 +853,16 @@ void PolarMap::finish(bool undersides) {
 }
 
 void draw_walls(const WallSet& walls, const float eye[3], const Floors& floors,
-                std::span<const std::uint32_t> only, const PolarGuards& guards, PolarMap& map,
-                PolarStats& stats) {
-  HWY_DYNAMIC_DISPATCH(draw_walls_target)(walls, eye, floors, only, guards, map, stats);
+                std::span<const std::uint32_t> only, const PolarGuards& guards, std::uint64_t most,
+                PolarMap& map, PolarStats& stats) {
+  HWY_DYNAMIC_DISPATCH(draw_walls_target)(walls, eye, floors, only, guards, most, map, stats);
 }
 
 void find_visible(const BoxTree& tree, std::uint32_t root, const float eye[3], bool undersides,
-                  const PolarMap& map, std::vector<std::uint32_t>& visible, PolarStats& stats) {
+                  const PolarMap& map, std::uint64_t most, std::vector<std::uint32_t>& visible,
+                  PolarStats& stats) {
   if (tree.nodes.empty()) return;
-  HWY_DYNAMIC_DISPATCH(find_visible_target)(tree, root, eye, undersides, map, visible, stats);
+  HWY_DYNAMIC_DISPATCH(find_visible_target)(tree, root, eye, undersides, map, most, visible, stats);
 }
 
 void find_visible_children(const BoxTree& tree, std::uint32_t root, const float eye[3],

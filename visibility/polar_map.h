@@ -110,7 +110,13 @@ struct PolarStats {
   std::uint32_t solids_tested = 0;
   std::uint32_t solids_drawn = 0;
   std::uint32_t walls_drawn = 0;
+  std::uint64_t bins_written = 0;
+  std::uint32_t nodes_searched = 0;  ///< of solids, while drawing
   std::uint32_t nodes_tested = 0;
+  bool cut = false;  ///< a limit was met
+  std::uint64_t draw_work() const {
+    return walls_drawn + bins_written / PolarMap::kBlock + std::uint64_t{2} * nodes_searched;
+  }
 };
 
 /// Guards of the map that tests take out one by one to prove that the verifier has power. All on in
@@ -126,14 +132,16 @@ struct PolarGuards {
 
 /// Draws the walls that can be seen past those already drawn, near ones first. `eye` is relative to
 /// the tree's origin and is the apex of the cell. `only`: if not empty, just these solids are
-/// drawn, in this order.
+/// drawn, in this order. `most`: nothing is begun once stats.draw_work() has reached it.
 void draw_walls(const WallSet& walls, const float eye[3], const Floors& floors,
-                std::span<const std::uint32_t> only, const PolarGuards& guards, PolarMap& map,
-                PolarStats& stats);
+                std::span<const std::uint32_t> only, const PolarGuards& guards, std::uint64_t most,
+                PolarMap& map, PolarStats& stats);
 
 /// Appends to `visible` the items of the tree below `root` that the map does not hide; any order.
+/// `most`: what is left once so many nodes have been tested is appended untested.
 void find_visible(const BoxTree& tree, std::uint32_t root, const float eye[3], bool undersides,
-                  const PolarMap& map, std::vector<std::uint32_t>& visible, PolarStats& stats);
+                  const PolarMap& map, std::uint64_t most, std::vector<std::uint32_t>& visible,
+                  PolarStats& stats);
 
 /// One step of find_visible(): appends the visible items of node `root` to `visible`, its visible
 /// children to `nodes`.

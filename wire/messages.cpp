@@ -29,6 +29,16 @@ fb::Vec3 to_fb(const Vec3& v) {
 Vec3 from_fb(const fb::Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
+fb::Speeds to_fb(const Pace& p) {
+  IVIS_ASSERT(p.valid(), "speeds are finite and within bounds");
+  return {p.horizontal_m_s, p.vertical_m_s, p.frame_s};
+}
+Result<Pace> from_fb(const fb::Speeds& s) {
+  const Pace pace{s.horizontal(), s.vertical(), s.frame()};
+  if (!pace.valid())
+    return input_error("speeds: not finite, negative, above 1e6 m/s or frames above an hour");
+  return pace;
+}
 
 // ---- encoding: one function a message, children before the envelope ----
 
@@ -40,7 +50,10 @@ flatbuffers::Offset<flatbuffers::String> put_string(FlatBufferBuilder& b, std::s
 
 flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Hello& m) {
   const auto reach = put_string(b, m.reach, kMaxNameBytes);
-  const auto hello = fb::CreateHello(b, m.version, m.want_table, m.scene_hash, reach);
+  const fb::Speeds speeds = to_fb(m.pace);
+  const auto hello = fb::CreateHello(
+      b, m.version, m.want_table, m.scene_hash, reach, m.pace == Pace{} ? nullptr : &speeds,
+      static_cast<std::uint8_t>(m.strategy ? 1 + static_cast<int>(*m.strategy) : 0), m.budget_us);
   fb::EnvelopeBuilder e(b);
   e.add_hello(hello);
   return e.Finish();
@@ -52,10 +65,14 @@ flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Welcome& m,
   IVIS_ASSERT(m.objects <= kMaxObjects, "the scene has no more objects than the protocol takes");
   flatbuffers::Offset<flatbuffers::Vector<std::uint8_t>> table = 0;
   if (!packed_table.empty()) table = b.CreateVector(packed_table.data(), packed_table.size());
-  const auto reach = put_string(b, m.reach, kMaxNameBytes);
+  IVIS_ASSERT(!m.reaches.empty() && m.reaches.size() <= kMaxRungs, "1 to kMaxRungs reaches");
+  std::vector<flatbuffers::Offset<flatbuffers::String>> strings;
+  for (const std::string& r : m.reaches)
+    strings.push_back(b.CreateString(r.data(), std::min(r.size(), kMaxNameBytes)));
+  const auto reaches = b.CreateVector(strings);
   const auto method = put_string(b, m.method, kMaxNameBytes);
   const auto welcome = fb::CreateWelcome(b, m.version, m.session, m.scene_hash, m.order_hash,
-                                         m.objects, reach, method, table);
+                                         m.objects, reaches, method, table);
   fb::EnvelopeBuilder e(b);
   e.add_welcome(welcome);
   return e.Finish();
@@ -69,7 +86,7 @@ flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Welcome& m) {
 
 flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const PoseMessage& m) {
   IVIS_ASSERT(finite(m.eye), "a pose is finite");
-  const fb::Pose pose(m.session, m.sequence, m.have_pvs, to_fb(m.eye));
+  const fb::Pose pose(m.session, m.sequence, m.have_pvs, to_fb(m.eye), m.hold_us);
   fb::EnvelopeBuilder e(b);
   e.add_pose(&pose);
   return e.Finish();
@@ -82,7 +99,8 @@ flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const PvsMessage& m)
     payload =
         b.CreateVector(reinterpret_cast<const std::uint8_t*>(m.payload.data()), m.payload.size());
   const fb::Pvs pvs(static_cast<std::uint32_t>(m.session),
-                    static_cast<std::uint32_t>(m.session >> 32U), m.sequence, m.base, m.solve_us);
+                    static_cast<std::uint32_t>(m.session >> 32U), m.sequence, m.base, m.solve_us,
+                    m.rung, m.safe);
   const fb::Vec3 centre = to_fb(m.eye.value_or(Vec3(0)));
   fb::EnvelopeBuilder e(b);
   if (m.eye) e.add_centre(&centre);
@@ -106,6 +124,13 @@ flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Bye& m) {
   return e.Finish();
 }
 
+flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const PaceMessage& m) {
+  const fb::Pace pace(m.session, to_fb(m.pace));
+  fb::EnvelopeBuilder e(b);
+  e.add_pace(&pace);
+  return e.Finish();
+}
+
 // ---- decoding: one function a message, after verification ----
 
 std::string text_of(const flatbuffers::String* s) {
@@ -120,15 +145,32 @@ Status check_string(const flatbuffers::String* s, std::size_t limit, const char*
 
 Result<Message> get(const fb::Hello& m) {
   if (const auto s = check_string(m.reach(), kMaxNameBytes, "hello: reach"); !s) return s.error();
-  return Message(Hello{m.version(), m.scene_hash(), text_of(m.reach()), m.want_table()});
+  Hello out{m.version(), m.scene_hash(), text_of(m.reach()), m.want_table(), {}, {}, m.budget_us()};
+  if (m.speeds() != nullptr) {
+    const auto pace = from_fb(*m.speeds());
+    if (!pace) return pace.error();
+    out.pace = *pace;
+  }
+  if (m.strategy() > 1 + static_cast<int>(Strategy::kPredictive))
+    return input_error("hello: unknown strategy " + std::to_string(m.strategy()));
+  if (m.strategy() > 0) out.strategy = static_cast<Strategy>(m.strategy() - 1);
+  return Message(std::move(out));
 }
 
 Result<Message> get(const fb::Welcome& m) {
-  if (const auto s = check_string(m.reach(), kMaxNameBytes, "welcome: reach"); !s) return s.error();
+  if (m.reaches() == nullptr || m.reaches()->size() == 0 || m.reaches()->size() > kMaxRungs)
+    return input_error(
+        "welcome: " + std::to_string(m.reaches() == nullptr ? 0 : m.reaches()->size()) +
+        " reaches, expected 1 to " + std::to_string(kMaxRungs));
+  std::vector<std::string> reaches;
+  for (const auto* r : *m.reaches()) {
+    if (const auto s = check_string(r, kMaxNameBytes, "welcome: reach"); !s) return s.error();
+    reaches.push_back(text_of(r));
+  }
   if (const auto s = check_string(m.method(), kMaxNameBytes, "welcome: method"); !s)
     return s.error();
   Welcome out{m.version(), m.session(),        m.scene_hash(),      m.order_hash(),
-              m.objects(), text_of(m.reach()), text_of(m.method()), {}};
+              m.objects(), std::move(reaches), text_of(m.method()), {}};
   // Also without a table: the client keeps bits an object.
   if (out.objects > kMaxObjects)
     return input_error("welcome: " + std::to_string(out.objects) + " objects, at most " +
@@ -145,7 +187,7 @@ Result<Message> get(const fb::Pose& m) {
   const Vec3 eye = from_fb(m.eye());
   if (!finite(eye))
     return input_error("pose " + std::to_string(m.sequence()) + ": eye is not finite");
-  return Message(PoseMessage{m.session(), m.sequence(), m.have_pvs(), eye});
+  return Message(PoseMessage{m.session(), m.sequence(), m.have_pvs(), eye, m.hold_us()});
 }
 
 Result<Message> get(const fb::Envelope& e, const fb::Pvs& m) {
@@ -154,6 +196,8 @@ Result<Message> get(const fb::Envelope& e, const fb::Pvs& m) {
   out.sequence = m.sequence();
   out.base = m.base();
   out.solve_us = m.solve_us();
+  out.rung = m.rung();
+  out.safe = m.safe();
   out.everything = e.payload() == nullptr;
   if (e.centre() != nullptr) {
     out.eye = from_fb(*e.centre());
@@ -177,7 +221,8 @@ Result<Message> get(const fb::Refused& m) {
 
 Result<Message> get(const fb::Envelope& e) {
   const int kinds = (e.pvs() != nullptr) + (e.pose() != nullptr) + (e.hello() != nullptr) +
-                    (e.welcome() != nullptr) + (e.refused() != nullptr) + (e.bye() != nullptr);
+                    (e.welcome() != nullptr) + (e.refused() != nullptr) + (e.bye() != nullptr) +
+                    (e.pace() != nullptr);
   if (kinds != 1)
     return input_error("message: " + std::to_string(kinds) +
                        " known kinds in one envelope, expected 1");
@@ -188,6 +233,11 @@ Result<Message> get(const fb::Envelope& e) {
   if (e.hello() != nullptr) return get(*e.hello());
   if (e.welcome() != nullptr) return get(*e.welcome());
   if (e.refused() != nullptr) return get(*e.refused());
+  if (e.pace() != nullptr) {
+    const auto pace = from_fb(e.pace()->speeds());
+    if (!pace) return pace.error();
+    return Message(PaceMessage{e.pace()->session(), *pace});
+  }
   return Message(Bye{e.bye()->session()});
 }
 

@@ -12,22 +12,28 @@
 
 #include "core/ids.h"
 #include "core/math.h"
+#include "core/pace.h"
 #include "core/reach.h"
 #include "core/result.h"
+#include "core/strategy.h"
 
 namespace ivis::wire {
 
-inline constexpr std::uint16_t kProtocolVersion = 1;
+inline constexpr std::uint16_t kProtocolVersion = 2;
 
 /// Client -> server, first.
 struct Hello {
   std::uint16_t version = kProtocolVersion;
   /// The client's scene, 0: it has none and takes the server's.
   SceneHash scene_hash = 0;
-  /// The reach the client wants; empty text: the server's own.
+  /// The reach that every cell shall have; empty text: the server chooses, by `pace`.
   std::string reach;
   /// Send the table that maps ranks to ids, nodes and instances.
   bool want_table = true;
+  Pace pace;
+  /// How solves keep to their time; none: the server's choice. A wish.
+  std::optional<Strategy> strategy;
+  std::uint32_t budget_us = 0;  ///< of one solve; 0: the server's choice
   bool operator==(const Hello&) const = default;
 };
 
@@ -49,7 +55,8 @@ struct Welcome {
   /// Of the rank order, so that two ends with different orders say so.
   std::uint64_t order_hash = 0;
   std::uint32_t objects = 0;
-  std::string reach;  ///< what every PVS of this session is valid for
+  /// What the session's cells may be, ascending; at least one. An answer names its own.
+  std::vector<std::string> reaches;
   std::string method;
   ObjectTable table;  ///< empty unless wanted
   bool operator==(const Welcome&) const = default;
@@ -62,6 +69,9 @@ struct PoseMessage {
   /// Sequence of the last PVS decoded, 0: none; acknowledges it as a base.
   std::uint32_t have_pvs = 0;
   Vec3 eye{0};
+  /// How long a PVS is in use past its pose, as the client measures it; 0: unknown. With the speeds
+  /// told it decides the cell.
+  std::uint32_t hold_us = 0;
   bool operator==(const PoseMessage&) const = default;
 };
 
@@ -75,7 +85,11 @@ struct PvsMessage {
   std::optional<Vec3> eye;
   /// All objects are listed, as nothing better can be said; payload empty.
   bool everything = false;
-  std::uint32_t solve_us = 0;      ///< visibility time at the server, for latency accounts
+  std::uint32_t solve_us = 0;  ///< visibility time at the server, for latency accounts
+  std::uint16_t rung = 0;      ///< the cell's reach: Welcome::reaches[rung]
+  /// The part of the speeds told that the cell holds for the time asked for, of kAllSafe.
+  std::uint16_t safe = kAllSafe;
+  static constexpr std::uint16_t kAllSafe = 65535;
   std::vector<std::byte> payload;  ///< wire/pvs_codec.h
   bool operator==(const PvsMessage&) const = default;
 };
@@ -98,19 +112,27 @@ struct Refused {
   bool operator==(const Refused&) const = default;
 };
 
+/// Client -> server: the observer's speeds from now on.
+struct PaceMessage {
+  std::uint64_t session = 0;
+  Pace pace;
+  bool operator==(const PaceMessage&) const = default;
+};
+
 /// Client -> server: the session is over.
 struct Bye {
   std::uint64_t session = 0;
   bool operator==(const Bye&) const = default;
 };
 
-using Message = std::variant<Hello, Welcome, PoseMessage, PvsMessage, Refused, Bye>;
+using Message = std::variant<Hello, Welcome, PoseMessage, PvsMessage, Refused, Bye, PaceMessage>;
 
 inline constexpr std::size_t kMaxMessageBytes = 64U << 20U;
 /// A row of the table is 12 bytes, 16 with clusters.
 inline constexpr std::size_t kMaxObjects = kMaxMessageBytes / 12;
 inline constexpr std::size_t kMaxClusters = kMaxMessageBytes / 16;  ///< objects in such a table
 inline constexpr std::size_t kMaxNameBytes = 256;                   ///< reach, method
+inline constexpr std::size_t kMaxRungs = 32;                        ///< Welcome::reaches
 inline constexpr std::size_t kMaxTextBytes = 1024;                  ///< Refused::text
 
 /// One message as one frame. Strings are cut to their bounds. Requires: finite eyes; a table that

@@ -48,10 +48,11 @@ TEST_F(Walk, WithoutPaceEveryPoseIsCoveredByItsOwnAnswer) {
   ASSERT_TRUE(record) << record.error().message;
   EXPECT_EQ(record->scene_hash, scene.hash);
   ASSERT_EQ(record->frames.size(), path.size());
+  client::RecordedSets sets(*record);
   for (std::size_t i = 0; i < path.size(); ++i) {
     EXPECT_TRUE(record->frames[i].covered);
     EXPECT_EQ(record->frames[i].eye, path[i].eye);
-    EXPECT_EQ(record->frames[i].pvs.objects, method.solve({path[i].eye, record->reach})->objects);
+    EXPECT_EQ(sets.at(i).objects, method.solve({path[i].eye, record->reach})->objects);
   }
 }
 
@@ -68,12 +69,15 @@ TEST_F(Walk, PacedStallingWalkDrawsFromWithinItsCellsOnly) {
   const auto record = client::read_record(file);
   ASSERT_TRUE(record) << record.error().message;
   std::size_t uncovered = 0;
-  for (const auto& f : record->frames) {
+  client::RecordedSets sets(*record);
+  for (std::size_t i = 0; i < record->frames.size(); ++i) {
+    const auto& f = record->frames[i];
+    const Pvs pvs = sets.at(i);
     if (!f.covered) {
       EXPECT_TRUE(f.everything) << "only before the first PVS";
       ++uncovered;
     } else {
-      EXPECT_EQ(f.pvs.objects, method.solve(f.pvs.cell)->objects);
+      EXPECT_EQ(pvs.objects, method.solve(f.cell)->objects);
     }
   }
   EXPECT_EQ(uncovered, r->uncovered_frames);
@@ -90,6 +94,65 @@ TEST_F(Walk, PacedIncompleteWalkCountsItsUncoveredFrames) {
   ASSERT_TRUE(r) << r.error().message;
   EXPECT_GT(r->uncovered_frames, 0U);
   EXPECT_EQ(r->stalls, 0U);
+}
+
+TEST_F(Walk, InRealTimeTellsItsSpeedAndStaysInCells) {
+  NearMethod small(scene), large(scene);
+  auto ladder = std::make_unique<server::Ladder>(
+      std::vector<Reach>{Reach::cylinder(1.5, 0.1), Reach::cylinder(50, 0.1)}, large, 0.001);
+  ladder->add(0, small);
+  RunningServer server(scene, std::move(ladder));
+  WalkOptions options;
+  options.fps = 100;  // 5 m/s: 5 cm a frame
+  options.seconds = 2;
+  options.record_file = file;
+  const auto r = walk(server.endpoint(), path, options);
+  ASSERT_TRUE(r) << r.error().message;
+  EXPECT_GT(r->frames, 20U);
+  EXPECT_EQ(r->uncovered_frames, 0U);
+  EXPECT_GT(small.solves, 0) << "the small cell serves once the time is measured";
+  EXPECT_GT(r->hold_ms, 0);
+  const auto record = client::read_record(file);
+  ASSERT_TRUE(record) << record.error().message;
+  Vec3 before = record->frames.front().wanted;
+  double time = 0;
+  for (const auto& f : record->frames) {
+    EXPECT_TRUE(f.covered);
+    if (!f.everything) {
+      EXPECT_TRUE(f.cell.contains(f.eye));
+    }
+    // Two frames' worth of jitter: late frames are passed over, and their way is made up for.
+    EXPECT_LT(glm::distance(f.wanted, before), 5 * (f.time_s - time) + 0.11) << f.time_s;
+    before = f.wanted;
+    time = f.time_s;
+  }
+}
+
+TEST_F(Walk, InRealTimeKeepsToTheSpeedLimit) {
+  RunningServer server(scene, method, Reach::cylinder(5, 0.1));
+  WalkOptions options;
+  options.fps = 100;
+  options.seconds = 1;
+  options.speed_limit_m_s = 1;
+  options.record_file = file;
+  const auto r = walk(server.endpoint(), path, options);
+  ASSERT_TRUE(r) << r.error().message;
+  const auto record = client::read_record(file);
+  ASSERT_TRUE(record) << record.error().message;
+  EXPECT_LT(glm::distance(record->frames.back().wanted, path.front().eye), 1.05);
+  EXPECT_GT(glm::distance(record->frames.back().wanted, path.front().eye), 0.2);
+}
+
+TEST_F(Walk, InRealTimeNeedsTimesThatAscend) {
+  WalkOptions options;
+  options.fps = 60;
+  path[3].t = path[2].t;
+  const auto r = walk("tcp://127.0.0.1:1", path, options);
+  ASSERT_FALSE(r);
+  EXPECT_EQ(r.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_NE(r.error().message.find("pose 3"), std::string::npos);
+  options.hz = 60;
+  EXPECT_EQ(walk("tcp://127.0.0.1:1", path, options).error().code, ErrorCode::kInvalidArgument);
 }
 
 TEST_F(Walk, FailsWithoutAServerPathOrLeave) {

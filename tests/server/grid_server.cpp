@@ -17,12 +17,13 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, [](int) { stop = true; });
   const ivis::Scene scene = ivis::test::grid_scene(std::atoi(argv[2]));
   const ivis::test::NearMethod method(scene);
-  const auto served = ivis::server::served_scene(scene, {});
+  const auto served = ivis::server::served_scene(scene);
+  const ivis::server::Ladder ladder(ivis::Reach::cylinder(1.5, 0.1), method,
+                                    ivis::OccluderSet{}.slack_m);
   ivis::server::Log log(ivis::server::LogLevel::kInfo, false);
   ivis::server::ServerOptions options;
   options.listen = argv[1];
-  auto server =
-      ivis::server::Server::bind(options, served, method, ivis::Reach::cylinder(1.5, 0.1), log);
+  auto server = ivis::server::Server::bind(options, served, ladder, log);
   if (!server) {
     std::fprintf(stderr, "%s\n", server.error().message.c_str());
     return 4;

@@ -17,11 +17,17 @@ class RunningServer {
   RunningServer(const Scene& scene, const Method& method,
                 const Reach& reach = Reach::cylinder(1.5, 0.1),
                 const std::string& listen = "tcp://127.0.0.1:*", server::SessionLimits limits = {})
-      : served_(server::served_scene(scene, {})), log_(server::LogLevel::kOff, false) {
+      : RunningServer(scene, std::make_unique<server::Ladder>(reach, method, OccluderSet{}.slack_m),
+                      listen, limits) {}
+  RunningServer(const Scene& scene, std::unique_ptr<server::Ladder> ladder,
+                const std::string& listen = "tcp://127.0.0.1:*", server::SessionLimits limits = {})
+      : served_(server::served_scene(scene)),
+        ladder_(std::move(ladder)),
+        log_(server::LogLevel::kOff, false) {
     server::ServerOptions options;
     options.listen = listen;
     options.limits = limits;
-    auto bound = server::Server::bind(options, served_, method, reach, log_);
+    auto bound = server::Server::bind(options, served_, *ladder_, log_);
     if (!bound) {
       ADD_FAILURE() << bound.error().message;
       return;
@@ -40,6 +46,7 @@ class RunningServer {
 
  private:
   server::ServedScene served_;
+  std::unique_ptr<server::Ladder> ladder_;
   server::Log log_;
   std::unique_ptr<server::Server> server_;
   std::atomic<bool> stop_{false};

@@ -133,14 +133,15 @@ class Address : public ServerSocket {
  protected:
   std::string path = ::testing::TempDir() + "ivis_address_" + std::to_string(getpid()) + ".sock";
   std::string ipc = "ipc://" + path;
-  server::ServedScene served = server::served_scene(scene, {});
+  server::ServedScene served = server::served_scene(scene);
+  server::Ladder ladder{Reach::disc(1), method, OccluderSet{}.slack_m};
   server::Log log{server::LogLevel::kOff, false};
   void TearDown() override { std::filesystem::remove(path); }
 
   Error bind_error(const std::string& listen) {
     server::ServerOptions options;
     options.listen = listen;
-    const auto s = server::Server::bind(options, served, method, Reach::disc(1), log);
+    const auto s = server::Server::bind(options, served, ladder, log);
     const auto probed = server::probe_address(listen);
     EXPECT_FALSE(s) << listen;
     EXPECT_FALSE(probed) << listen;

@@ -28,13 +28,15 @@ class Sessions : public ::testing::Test {
  protected:
   Scene scene = grid_scene(12);
   NearMethod method{scene};
-  server::ServedScene served = server::served_scene(scene, {});
+  server::ServedScene served = server::served_scene(scene);
+  std::unique_ptr<server::Ladder> ladder =
+      std::make_unique<server::Ladder>(Reach::disc(2), method, OccluderSet{}.slack_m);
   server::SessionLimits limits;
   SessionTable::Time now{};
   std::unique_ptr<SessionTable> table_;
 
   SessionTable& table() {
-    if (!table_) table_ = std::make_unique<SessionTable>(served, method, Reach::disc(2), limits);
+    if (!table_) table_ = std::make_unique<SessionTable>(served, *ladder, limits);
     return *table_;
   }
   std::optional<wire::Message> say(const Peer& peer, const wire::Message& m) {
@@ -98,7 +100,7 @@ TEST_F(Sessions, WelcomeNamesEveryObject) {
   const auto w = std::get<wire::Welcome>(decoded(*table().work(), "a"));
   EXPECT_EQ(w.scene_hash, scene.hash);
   EXPECT_EQ(w.objects, scene.object_count());
-  EXPECT_EQ(w.reach, "disc:2");
+  EXPECT_EQ(w.reaches, std::vector<std::string>{"disc:2"});
   EXPECT_NE(w.session, 0U);
   ASSERT_EQ(w.table.id.size(), scene.object_count());
   for (Rank r = 0; r < w.objects; ++r)
@@ -264,7 +266,8 @@ TEST_F(Sessions, ServesASmallerReachAndRefusesALargerOne) {
   wire::Hello hello;
   hello.reach = "disc:1";
   EXPECT_FALSE(say({"a", 0, {}, {}}, hello));
-  EXPECT_EQ(std::get<wire::Welcome>(decoded(*table().work(), "a")).reach, "disc:1");
+  EXPECT_EQ(std::get<wire::Welcome>(decoded(*table().work(), "a")).reaches,
+            std::vector<std::string>{"disc:1"});
   hello.reach = "disc:2.1";
   EXPECT_EQ(reason(say({"a", 0, {}, {}}, hello)), Refusal::kReach);
   hello.reach = "ball:1";  // reaches up, where the disc does not
@@ -281,11 +284,123 @@ TEST_F(Sessions, CompareReachesWithTheSlackOfTheOccludersAsASolveDoes) {
   hello.reach = "ellipsoid:0.95,0.4,0.95";
   for (const double slack_m : {0.001, 0.05}) {
     occluders.slack_m = slack_m;
-    served = server::served_scene(scene, occluders);
-    table_ = std::make_unique<SessionTable>(served, method, occluders.reach, limits);
+    ladder = std::make_unique<server::Ladder>(occluders.reach, method, slack_m);
+    table_ = std::make_unique<SessionTable>(served, *ladder, limits);
     const auto refused = say({"a", 0, {}, {}}, hello);
     EXPECT_EQ(!refused, serves(occluders, *Reach::parse(hello.reach))) << slack_m;
     EXPECT_EQ(!refused, slack_m < 0.01);
+  }
+}
+
+class SessionsOnALadder : public Sessions {
+ protected:
+  NearMethod small{scene, 4}, middle{scene, 6};
+  SessionsOnALadder() {
+    ladder = std::make_unique<server::Ladder>(
+        std::vector<Reach>{Reach::disc(0.5), Reach::disc(1), Reach::disc(2)}, method, 0.001);
+    ladder->add(0, small);
+    ladder->add(1, middle);
+  }
+  Peer greet_with(const wire::Hello& hello, std::vector<std::string> reaches) {
+    Peer peer{"a", 0, {}, {}};
+    EXPECT_FALSE(say(peer, hello));
+    const auto w = std::get<wire::Welcome>(decoded(*table().work(), "a"));
+    EXPECT_EQ(w.reaches, reaches);
+    peer.session = w.session;
+    peer.id_of = w.table.id;
+    return peer;
+  }
+  wire::PvsMessage answered(const Peer& peer, std::uint32_t sequence, std::uint32_t hold_us) {
+    EXPECT_FALSE(say(peer, wire::PoseMessage{peer.session, sequence, 0, {11, 1, 11}, hold_us}));
+    return next_pvs(peer);
+  }
+};
+
+TEST_F(SessionsOnALadder, TheCellIsTheSmallestThatHoldsTheSpeedForTheTime) {
+  wire::Hello hello;
+  hello.pace = {10, 0, 0.02};
+  Peer a = greet_with(hello, {"disc:0.5", "disc:1", "disc:2"});
+  EXPECT_EQ(answered(a, 1, 0).rung, 2) << "no time is known";
+  wire::PvsMessage m = answered(a, 2, 50'000);
+  EXPECT_EQ(m.rung, 0);
+  EXPECT_EQ(m.safe, wire::PvsMessage::kAllSafe);
+  EXPECT_EQ(ids(a, m), small.solve({{11, 1, 11}, Reach::disc(0.5)})->objects);
+  m = answered(a, 3, 51'000);
+  EXPECT_EQ(m.rung, 1);
+  EXPECT_EQ(ids(a, m), middle.solve({{11, 1, 11}, Reach::disc(1)})->objects);
+  m = answered(a, 4, 400'000);  // 4 m
+  EXPECT_EQ(m.rung, 2);
+  EXPECT_NEAR(m.safe, wire::PvsMessage::kAllSafe / 2, 60);
+  EXPECT_LE(m.safe * 4.0 / wire::PvsMessage::kAllSafe, 2.003);
+  EXPECT_EQ(table().counters().beyond_ladder, 1U);
+  // Faster from now on.
+  EXPECT_FALSE(say(a, wire::PaceMessage{a.session, {20, 0, 0.02}}));
+  EXPECT_EQ(answered(a, 5, 50'000).rung, 1);
+  EXPECT_FALSE(say(a, wire::PaceMessage{a.session, {}}));
+  EXPECT_EQ(answered(a, 6, 50'000).rung, 2) << "nothing is told any more";
+  EXPECT_EQ(reason(say(a, wire::PaceMessage{a.session + 1, {}})), Refusal::kSession);
+  EXPECT_EQ(reason(say({"nobody", 0, {}, {}}, wire::PaceMessage{1, {}})), Refusal::kSession);
+}
+
+TEST_F(SessionsOnALadder, AWishForAStrategyReachesTheMethodAsWork) {
+  struct Recording : NearMethod {
+    using NearMethod::NearMethod;
+    using NearMethod::solve;
+    Result<Pvs> solve(const ViewCell& cell, const Effort& effort, Work& done) const override {
+      seen.push_back(effort);
+      done.cut = true;
+      return NearMethod::solve(cell);
+    }
+    bool keeps_to_effort() const override { return true; }
+    mutable std::vector<Effort> seen;
+  };
+  const Recording recording(scene);
+  const server::Ladder one(Reach::disc(2), recording, 0.001);
+  server::CostModel cost;
+  cost.fixed_ms = 0.1;
+  cost.draw_ms = 0.001;
+  cost.test_ms = 0.002;
+  cost.draw_share = 0.25;
+  limits.strategy = Strategy::kPredictive;
+  limits.budget_ms = 0.5;
+  table_ = std::make_unique<SessionTable>(served, one, limits, cost);
+  wire::Hello hello;
+  const auto asked = [&](std::uint32_t sequence) {
+    Peer a = greet_with(hello, {"disc:2"});
+    EXPECT_FALSE(say(a, wire::PoseMessage{a.session, sequence, 0, {11, 1, 11}, 0}));
+    static_cast<void>(next_pvs(a));
+  };
+  asked(1);  // the server's own
+  hello.strategy = Strategy::kAbort;
+  hello.budget_us = 1100;
+  asked(2);
+  hello.budget_us = 50;  // less than what is fixed
+  asked(3);
+  EXPECT_EQ(table().counters().cut_short, 3U);
+  hello.strategy = Strategy::kGuaranteed;
+  asked(4);
+  ASSERT_EQ(recording.seen.size(), 3U) << "guaranteed needs no budget";
+  EXPECT_EQ(recording.seen[0].strategy, Strategy::kPredictive);
+  EXPECT_EQ(recording.seen[0].draw, 100U);
+  EXPECT_EQ(recording.seen[0].test, 150U);
+  EXPECT_EQ(recording.seen[1].strategy, Strategy::kAbort);
+  EXPECT_EQ(recording.seen[1].draw, 250U);
+  EXPECT_EQ(recording.seen[1].test, 375U);
+  EXPECT_EQ(recording.seen[2].draw, 0U);
+  EXPECT_EQ(recording.seen[2].test, 0U);
+}
+
+TEST_F(SessionsOnALadder, AClientThatNamesItsReachGetsThatOnly) {
+  wire::Hello hello;
+  hello.pace = {10, 0, 0.02};
+  hello.reach = "disc:0.8";
+  Peer a = greet_with(hello, {"disc:0.8"});
+  for (const std::uint32_t hold_us : {0U, 10'000U, 900'000U}) {
+    const wire::PvsMessage m = answered(a, 1 + hold_us, hold_us);
+    EXPECT_EQ(m.rung, 0);
+    EXPECT_EQ(m.safe, wire::PvsMessage::kAllSafe);
+    EXPECT_EQ(ids(a, m), middle.solve({{11, 1, 11}, Reach::disc(0.8)})->objects)
+        << "the smallest rung that serves it";
   }
 }
 

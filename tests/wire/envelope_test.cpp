@@ -1,6 +1,8 @@
 // Envelopes that FlatBuffers finds in order and the protocol does not: made with the schema
 // directly.
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "ivis_generated.h"
@@ -12,8 +14,8 @@ namespace {
 using flatbuffers::FlatBufferBuilder;
 
 const fb::Bye kBye(1);
-const fb::Pvs kPvs(1, 0, 2, 0, 3);
-const fb::Pose kPose(1, 2, 0, fb::Vec3(1, 2, 3));
+const fb::Pvs kPvs(1, 0, 2, 0, 3, 0, 65535);
+const fb::Pose kPose(1, 2, 0, fb::Vec3(1, 2, 3), 0);
 
 std::string error_of(FlatBufferBuilder& b, flatbuffers::Offset<fb::Envelope> envelope) {
   b.FinishSizePrefixed(envelope);
@@ -48,10 +50,13 @@ TEST(WireEnvelope, MustKeepStringsToTheirBounds) {
   const auto hello = fb::CreateHello(a, 1, true, 0, a.CreateString(name));
   EXPECT_EQ(error_of(a, fb::CreateEnvelope(a, nullptr, 0, nullptr, nullptr, hello)),
             "hello: reach: 257 bytes, at most 256");
-  const auto reach = fb::CreateWelcome(b, 1, 2, 3, 4, 5, b.CreateString(name));
+  const auto reach = fb::CreateWelcome(
+      b, 1, 2, 3, 4, 5,
+      b.CreateVector(std::vector{b.CreateString("disc:1"), b.CreateString(name)}));
   EXPECT_EQ(error_of(b, fb::CreateEnvelope(b, nullptr, 0, nullptr, nullptr, 0, reach)),
             "welcome: reach: 257 bytes, at most 256");
-  const auto method = fb::CreateWelcome(c, 1, 2, 3, 4, 5, 0, c.CreateString(name));
+  const auto one = c.CreateVector(std::vector{c.CreateString("disc:1")});
+  const auto method = fb::CreateWelcome(c, 1, 2, 3, 4, 5, one, c.CreateString(name));
   EXPECT_EQ(error_of(c, fb::CreateEnvelope(c, nullptr, 0, nullptr, nullptr, 0, method)),
             "welcome: method: 257 bytes, at most 256");
   const auto refused = fb::CreateRefused(d, 1, 3, d.CreateString(text));
@@ -62,23 +67,61 @@ TEST(WireEnvelope, MustKeepStringsToTheirBounds) {
             "no error");
 }
 
+TEST(WireEnvelope, MustNameOneToThirtyTwoReaches) {
+  for (const std::size_t count : {std::size_t{0}, std::size_t{1}, kMaxRungs, kMaxRungs + 1}) {
+    FlatBufferBuilder b;
+    std::vector<flatbuffers::Offset<flatbuffers::String>> reaches(count);
+    for (auto& r : reaches)
+      r = b.CreateString("disc:1");
+    const auto welcome = fb::CreateWelcome(b, 2, 2, 3, 4, 5, b.CreateVector(reaches));
+    const std::string found =
+        error_of(b, fb::CreateEnvelope(b, nullptr, 0, nullptr, nullptr, 0, welcome));
+    EXPECT_EQ(found, count == 1 || count == kMaxRungs
+                         ? "no error"
+                         : "welcome: " + std::to_string(count) + " reaches, expected 1 to 32");
+  }
+  FlatBufferBuilder none;
+  const auto welcome = fb::CreateWelcome(none, 2, 2, 3, 4, 5);
+  EXPECT_EQ(error_of(none, fb::CreateEnvelope(none, nullptr, 0, nullptr, nullptr, 0, welcome)),
+            "welcome: 0 reaches, expected 1 to 32");
+}
+
+TEST(WireEnvelope, MustTellSpeedsThatAreSpeeds) {
+  for (const double bad : {-1.0, 1e7, std::nan(""), HUGE_VAL}) {
+    for (const fb::Speeds& speeds :
+         {fb::Speeds(bad, 0, 0), fb::Speeds(0, bad, 0), fb::Speeds(0, 0, bad)}) {
+      FlatBufferBuilder a, b;
+      const auto hello = fb::CreateHello(a, 2, true, 0, 0, &speeds);
+      EXPECT_NE(
+          error_of(a, fb::CreateEnvelope(a, nullptr, 0, nullptr, nullptr, hello)).find("speeds"),
+          std::string::npos);
+      const fb::Pace pace(1, speeds);
+      EXPECT_NE(
+          error_of(b, fb::CreateEnvelope(b, nullptr, 0, nullptr, nullptr, 0, 0, 0, nullptr, &pace))
+              .find("speeds"),
+          std::string::npos);
+    }
+  }
+}
+
 // A writer in another language may put tables and vectors in any order.
 TEST(WireEnvelope, MayBeLaidOutInAnotherOrder) {
   FlatBufferBuilder b;
   b.ForceDefaults(true);
   const auto method = b.CreateString("m");
-  const auto reach = b.CreateString("ball:2");
+  const auto reaches =
+      b.CreateVector(std::vector{b.CreateString("ball:1"), b.CreateString("ball:2")});
   fb::WelcomeBuilder w(b);
   w.add_method(method);
   w.add_objects(0);
   w.add_session(9);
-  w.add_reach(reach);
+  w.add_reaches(reaches);
   w.add_version(1);
   const auto welcome = w.Finish();
   b.FinishSizePrefixed(fb::CreateEnvelope(b, nullptr, 0, nullptr, nullptr, 0, welcome));
   const auto m = decode({reinterpret_cast<const std::byte*>(b.GetBufferPointer()), b.GetSize()});
   ASSERT_TRUE(m) << m.error().message;
-  EXPECT_EQ(std::get<Welcome>(*m), (Welcome{1, 9, 0, 0, 0, "ball:2", "m", {}}));
+  EXPECT_EQ(std::get<Welcome>(*m), (Welcome{1, 9, 0, 0, 0, {"ball:1", "ball:2"}, "m", {}}));
 }
 
 }  // namespace

@@ -29,14 +29,17 @@ std::vector<Message> samples() {
   centred.eye = Vec3(1, -2, 3.25);
   PvsMessage everything = pvs_of(0);
   everything.everything = true;
-  Welcome w{1, 0xfedcba9876543210U, 5, 6, 3, "disc:1", "cull_map", {}};
+  Welcome w{1, 0xfedcba9876543210U, 5, 6, 3, {"disc:0.5", "disc:1"}, "cull_map", {}};
   Welcome with_table = w;
   with_table.table = {{2, 0, 1}, {10, 10, 11}, {1, 0, 0}};
   return {Hello{},
-          Hello{9, 77, "cylinder:1.5,0.1", false},
+          Hello{9, 77, "cylinder:1.5,0.1", false, {}, Strategy::kAbort, 250},
+          Hello{2, 0, "", true, {30, 2.5, 1.0 / 60}, {}, 0},
+          PaceMessage{7, {1, 0, 0}},
           w,
           with_table,
           PoseMessage{1, 2, 3, {4, 5, -6}},
+          PoseMessage{1, 2, 3, {4, 5, -6}, 16667},
           pvs_of(0),
           pvs_of(1),
           pvs_of(200),
@@ -80,9 +83,9 @@ TEST(WireMessages, TellEverythingFromNothingChanged) {
   EXPECT_FALSE(std::get<PvsMessage>(*nothing).everything);
 }
 
-TEST(WireMessages, PvsEnvelopeIsFortyEightBytes) {
-  EXPECT_EQ(encode(pvs_of(200)).size(), 248U);
-  EXPECT_EQ(encode(pvs_of(197)).size(), 248U);
+TEST(WireMessages, PvsEnvelopeIsFiftyTwoBytes) {
+  EXPECT_EQ(encode(pvs_of(200)).size(), 252U);
+  EXPECT_EQ(encode(pvs_of(197)).size(), 252U);
 }
 
 TEST(WireMessages, ReadFromAnyAddress) {
@@ -105,7 +108,7 @@ TEST(WireMessages, CutTheirOwnStringsToTheBound) {
 }
 
 TEST(WireMessages, AWelcomeIsTheSameWhoeverPacksItsTable) {
-  Welcome w{1, 2, 3, 4, 3, "disc:1", "m", {{2, 0, 1}, {10, 10, 11}, {1, 0, 0}}};
+  Welcome w{1, 2, 3, 4, 3, {"disc:1"}, "m", {{2, 0, 1}, {10, 10, 11}, {1, 0, 0}}};
   const Bytes whole = encode(w);
   const auto packed = pack_table(w.table);
   w.table = {};
@@ -113,7 +116,7 @@ TEST(WireMessages, AWelcomeIsTheSameWhoeverPacksItsTable) {
 }
 
 TEST(WireMessages, LeaveAnotherVersionToTheReceiver) {
-  const auto back = decode(encode(Hello{77, 0, "", true}));
+  const auto back = decode(encode(Hello{77, 0, "", true, {}, {}, 0}));
   ASSERT_TRUE(back);
   EXPECT_EQ(std::get<Hello>(*back).version, 77);
 }
@@ -174,14 +177,14 @@ TEST(WireDecoder, RejectsAnUnknownReason) {
 }
 
 TEST(WireDecoder, RejectsMoreObjectsThanTheProtocolTakes) {
-  Welcome w{1, 2, 3, 4, 0x00345678, "disc:1", "m", {}};
+  Welcome w{1, 2, 3, 4, 0x00345678, {"disc:1"}, "m", {}};
   EXPECT_NE(error_of(patched(encode(w), w.objects, 0xffffffffU))
                 .find("welcome: 4294967295 objects, at most 5592405"),
             std::string::npos);
 }
 
 TEST(WireDecoder, RejectsATableOfAnotherLength) {
-  Welcome w{1, 2, 3, 4, 0, "disc:1", "m", {}};
+  Welcome w{1, 2, 3, 4, 0, {"disc:1"}, "m", {}};
   w.objects = 0x1234;
   for (std::uint32_t i = 0; i < w.objects; ++i) {
     w.table.id.push_back(i);

@@ -51,6 +51,16 @@ typedef enum ivis_status {
   IVIS_ERROR_TIMEOUT = 6     /* what was waited for did not come in time */
 } ivis_status;
 
+/* How fast the observer moves at most, and how often it draws. With it the server gives the
+ * smallest cell that holds the observer while a PVS is in use, which the client measures: the
+ * faster the answers, the smaller the sets. Faster than told: the policy applies more often,
+ * nothing is missed. All 0: not told; cells are as large as the server has. */
+typedef struct ivis_pace {
+  double horizontal_m_s; /* in the ground plane; 0 to 1e6 */
+  double vertical_m_s;
+  double frame_s; /* between frames; 0: not told */
+} ivis_pace;
+
 /* What a client does when the eye is outside the cell of the PVS it has. */
 typedef enum ivis_policy {
   IVIS_POLICY_EVERYTHING = 0, /* every object is visible until the next PVS arrives; default */
@@ -58,17 +68,31 @@ typedef enum ivis_policy {
   IVIS_POLICY_INCOMPLETE = 2 /* the old PVS is used on; objects may be missing */
 } ivis_policy;
 
+/* How the server's solves keep to their time; with each the set is complete. */
+typedef enum ivis_strategy {
+  IVIS_STRATEGY_SERVER = 0,     /* as the server is configured; default */
+  IVIS_STRATEGY_GUARANTEED = 1, /* all there is: smallest sets, time bounded by the scene */
+  IVIS_STRATEGY_ABORT = 2,      /* draws near occluders first and stops at the budget */
+  IVIS_STRATEGY_PREDICTIVE = 3  /* chooses occluders for the budget before drawing */
+} ivis_strategy;
+
 typedef struct ivis_client_options {
   uint32_t size;        /* of this struct, as ivis_client_options_default() set it */
   const char* endpoint; /* tcp://HOST:PORT or ipc://PATH; copied */
   uint64_t scene_hash;  /* of the scene you have (`ivis info`); 0: take the server's */
-  const char* reach;    /* e.g. "disc:1", at most the server's; NULL: the server's; copied */
+  const char* reach; /* of every cell, e.g. "disc:1", at most the server's; NULL: by pace; copied */
   ivis_policy policy;
   int32_t connect_timeout_ms; /* 0: return at once, connect behind the scenes */
   int32_t silence_timeout_ms; /* an unanswered server counts as gone after this */
+  ivis_pace pace;
+  uint8_t predict;        /* 1: centre cells where the observer is going, by its last two poses */
+  ivis_strategy strategy; /* a wish: a method without budgets does all there is */
+  uint32_t budget_us;     /* of one solve; 0: the server's */
+  uint32_t linger_frames; /* objects are drawn for so many frames after they left the set */
 } ivis_client_options;
 
-/* tcp://127.0.0.1:7447, any scene, the server's reach, EVERYTHING, 5000 ms, 2000 ms. */
+/* tcp://127.0.0.1:7447, any scene, the server's reach, EVERYTHING, 5000 ms, 2000 ms, no pace, no
+ * prediction, the server's strategy, no lingering. */
 IVIS_API ivis_client_options ivis_client_options_default(void);
 
 /* Connects and waits until the server has said what it serves.
@@ -78,6 +102,22 @@ IVIS_API ivis_status ivis_client_connect(const ivis_client_options* options, ivi
                                          char* error, size_t error_size);
 /* NULL is allowed. Frees everything the client handed out. */
 IVIS_API void ivis_client_close(ivis_client* client);
+
+/* From the next frame on. Errors: ARGUMENT for a policy that is none, speeds out of bounds. */
+IVIS_API ivis_status ivis_client_set_policy(ivis_client* client, ivis_policy policy);
+IVIS_API ivis_status ivis_client_set_pace(ivis_client* client, const ivis_pace* pace);
+
+/* Why an eye is outside the cell of the PVS in hand; of several reasons the first that holds. */
+typedef enum ivis_cause {
+  IVIS_CAUSE_NONE = 0,         /* it is not */
+  IVIS_CAUSE_NO_ANSWER = 1,    /* there has been no PVS yet */
+  IVIS_CAUSE_DISCONNECTED = 2, /* the server is not there */
+  IVIS_CAUSE_SPEED = 3,        /* the eye moved faster than the pace told */
+  IVIS_CAUSE_LADDER = 4,       /* the server has no cell as large as the pace needs */
+  IVIS_CAUSE_LATE = 5,         /* the next PVS is later than those before it were */
+  IVIS_CAUSE_OTHER = 6         /* no pace was told, or it has not been measured yet */
+} ivis_cause;
+#define IVIS_CAUSES 7
 
 /* What holds for one frame. */
 typedef struct ivis_frame {
@@ -89,7 +129,13 @@ typedef struct ivis_frame {
   uint32_t sequence;     /* of the pose whose PVS is in use; 0: none yet */
   uint32_t object_count; /* 0 until the server has been met */
   uint32_t visible_count;
-  double cell_eye[3];           /* centre of the view cell of that PVS */
+  double cell_eye[3];     /* centre of the view cell of that PVS */
+  const char* cell_reach; /* and its reach; "" without one; valid as visible_bits */
+  uint8_t cause;          /* ivis_cause: why the eye given is outside the cell */
+  double pvs_age_s;       /* since the pose of that PVS was sent; 0 without one */
+  double margin_m;        /* from the eye to the cell's border, along the ground for upright
+                             cells; 0 outside and without one */
+  double safe;            /* the part of the pace at which no stall is to be expected, 0 to 1 */
   const uint64_t* visible_bits; /* bit (id & 63) of word (id >> 6); valid until the next call with
                                    this client, NULL while object_count is 0 */
 } ivis_frame;
@@ -124,6 +170,11 @@ typedef struct ivis_stats {
   uint64_t bad_messages;     /* of the server, that could not be used */
   double last_solve_ms;      /* visibility time of the latest answer, as the server measured it */
   double last_round_trip_ms; /* from its pose's sending to its PVS being decoded */
+  uint64_t causes[IVIS_CAUSES]; /* frames whose eye was outside the cell, by ivis_cause */
+  double held_m;                /* by how far eyes were held back, summed over frames */
+  double latency_ms;            /* L: from a pose to its PVS being used, a high quantile */
+  double interval_ms;           /* T: between poses whose PVS were used, likewise */
+  double hold_ms; /* for how long past its pose a PVS is used, likewise: L + T - frame */
 } ivis_stats;
 IVIS_API void ivis_client_stats(const ivis_client* client, ivis_stats* out);
 
@@ -131,7 +182,7 @@ IVIS_API void ivis_client_stats(const ivis_client* client, ivis_stats* out);
 typedef struct ivis_info {
   uint64_t scene_hash;
   uint32_t object_count;
-  const char* reach; /* of every cell, e.g. "cylinder:1.5,0.1" */
+  const char* reach; /* of the largest cell, e.g. "cylinder:1.5,0.1" */
   const char* method;
 } ivis_info;
 /* Errors: CONNECTION while no server has been met. */
@@ -156,6 +207,8 @@ IVIS_API ivis_status ivis_object_cluster(const ivis_client* client, uint32_t id,
 /* What went wrong last, for a person; "" if nothing did. Valid until the next call with this
  * client. */
 IVIS_API const char* ivis_client_error(const ivis_client* client);
+/* Name of a cause, never NULL. */
+IVIS_API const char* ivis_cause_name(ivis_cause cause);
 /* Name of a status, never NULL. */
 IVIS_API const char* ivis_status_name(ivis_status status);
 

@@ -1,0 +1,19 @@
+#pragma once
+
+namespace ivis {
+
+/// How fast an observer moves at most, and how often it draws. All 0: not told.
+struct Pace {
+  double horizontal_m_s = 0;  ///< in the ground plane, in any direction
+  double vertical_m_s = 0;
+  double frame_s = 0;  ///< between frames
+  bool told() const { return horizontal_m_s > 0 || vertical_m_s > 0; }
+  /// Bounded, so that no product with a time overflows.
+  bool valid() const {
+    const auto in = [](double v, double most) { return v >= 0 && v <= most; };
+    return in(horizontal_m_s, 1e6) && in(vertical_m_s, 1e6) && in(frame_s, 3600);
+  }
+  bool operator==(const Pace&) const = default;
+};
+
+}  // namespace ivis

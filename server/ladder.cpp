@@ -1,0 +1,112 @@
+#include "server/ladder.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "core/assert.h"
+#include "core/view_cell.h"
+#include "wire/messages.h"
+
+namespace ivis::server {
+namespace {
+
+/// `factor` times the vectors of a cylinder, box or ellipsoid of the given horizontal extents.
+Reach scaled(const Reach& reach, double factor) {
+  const Vec3 e = reach.half_extents();
+  const Vec3 s{e.x * factor, e.y, e.z * factor};
+  switch (reach.kind()) {
+    case Reach::Kind::kBall:
+      return Reach::ball(s.x);
+    case Reach::Kind::kDisc:
+      return Reach::disc(s.x);
+    case Reach::Kind::kCylinder:
+      return Reach::cylinder(s.x, s.y);
+    case Reach::Kind::kEllipsoid:
+      return Reach::ellipsoid(s);
+    case Reach::Kind::kBox:
+      break;
+  }
+  return Reach::box(s);
+}
+
+}  // namespace
+
+Ladder::Ladder(std::vector<Reach> reaches, const Method& largest, double slack_m)
+    : reaches_(std::move(reaches)), slack_m_(slack_m), methods_(reaches_.size()) {
+  IVIS_ASSERT(!reaches_.empty() && reaches_.size() <= wire::kMaxRungs, "rungs of a ladder");
+  methods_.back() = &largest;
+}
+
+std::uint32_t Ladder::ready() const {
+  return static_cast<std::uint32_t>(
+      std::count_if(methods_.begin(), methods_.end(), [](const auto& m) { return m != nullptr; }));
+}
+
+Ladder::Choice Ladder::choose(const Reach& wanted) const {
+  for (std::uint32_t i = 0; i < reaches_.size(); ++i)
+    if (const Method* m = methods_[i]; m != nullptr && serves(reaches_[i], slack_m_, wanted))
+      return {i, m, 1};
+  const auto last = static_cast<std::uint32_t>(reaches_.size() - 1);
+  const Vec3 e = wanted.half_extents();
+  double safe = 0;
+  double not_safe = 1;
+  for (int i = 0; i < 24; ++i) {
+    const double middle = (safe + not_safe) / 2;
+    const Reach part = Reach::cylinder(e.x * middle, e.y * middle);
+    (serves(reaches_[last], slack_m_, part) ? safe : not_safe) = middle;
+  }
+  return {last, methods_[last], safe};
+}
+
+Ladder::Choice Ladder::choose(const Pace& pace, std::uint32_t hold_us) const {
+  if (!pace.told() || hold_us == 0)
+    return {static_cast<std::uint32_t>(reaches_.size() - 1), methods_.back(), 1};
+  const double hold_s = hold_us * 1e-6;
+  return choose(Reach::cylinder(pace.horizontal_m_s * hold_s, pace.vertical_m_s * hold_s));
+}
+
+std::vector<Reach> ladder_below(const Reach& largest, std::size_t count) {
+  std::vector<Reach> reaches;
+  double factor = 1;
+  for (std::size_t i = 0; i < count; ++i) {
+    reaches.push_back(scaled(largest, factor));
+    factor *= kLadderStep;
+  }
+  std::reverse(reaches.begin(), reaches.end());
+  reaches.erase(std::unique(reaches.begin(), reaches.end()), reaches.end());  // of size 0
+  return reaches;
+}
+
+Result<std::vector<Reach>> parse_ladder(std::string_view text, const Reach& largest,
+                                        double slack_m) {
+  constexpr std::size_t kAuto = 4;
+  if (text == "none") return std::vector<Reach>{largest};
+  if (text == "auto") return ladder_below(largest, kAuto);
+  std::vector<Reach> reaches;
+  while (true) {
+    const auto from = text.find_first_not_of(' ');
+    if (from == std::string_view::npos) break;
+    text.remove_prefix(from);
+    const auto end = std::min(text.find(' '), text.size());
+    auto reach = Reach::parse(text.substr(0, end));
+    if (!reach) return Error{ErrorCode::kInvalidArgument, "ladder: " + reach.error().message};
+    if (!reaches.empty() && !serves(*reach, slack_m, reaches.back()))
+      return invalid_argument("ladder: " + reach->to_string() + " does not hold " +
+                              reaches.back().to_string() + " before it, expected them ascending");
+    reaches.push_back(*reach);
+    text.remove_prefix(end);
+  }
+  if (reaches.empty())
+    return invalid_argument("ladder: no reaches, expected 'auto', 'none' or reaches, ascending");
+  if (!serves(largest, slack_m, reaches.back()))
+    return invalid_argument("ladder: " + reaches.back().to_string() + " is larger than the reach " +
+                            largest.to_string());
+  if (!(reaches.back() == largest)) reaches.push_back(largest);
+  if (reaches.size() > wire::kMaxRungs)
+    return invalid_argument("ladder: " + std::to_string(reaches.size()) + " rungs, at most " +
+                            std::to_string(wire::kMaxRungs));
+  return reaches;
+}
+
+}  // namespace ivis::server

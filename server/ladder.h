@@ -1,0 +1,68 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "core/pace.h"
+#include "core/reach.h"
+#include "core/result.h"
+#include "visibility/method.h"
+
+namespace ivis::server {
+
+/// Reaches that cells can be solved for, ascending, each with a method on occluders shrunk for it
+/// once that is ready: the smaller the cell, the smaller the set. The largest is ready from the
+/// start and serves whatever a smaller one would.
+/// Threads:   reaches are fixed; a method may be added in one thread while others look.
+/// Ownership: borrows the methods.
+class Ladder {
+ public:
+  struct Choice {
+    std::uint32_t rung = 0;
+    const Method* method = nullptr;
+    double safe = 1;  ///< the part of the declared speeds that the rung's cells hold
+  };
+
+  /// Ascending, each serving the one before, at most wire::kMaxRungs; `largest` is the method of
+  /// the last. `slack_m`: of the occluders.
+  Ladder(std::vector<Reach> reaches, const Method& largest, double slack_m);
+  /// Of one rung.
+  Ladder(const Reach& reach, const Method& method, double slack_m)
+      : Ladder(std::vector<Reach>{reach}, method, slack_m) {}
+
+  const std::vector<Reach>& reaches() const { return reaches_; }
+  const Reach& largest() const { return reaches_.back(); }
+  double slack_m() const { return slack_m_; }
+  const Method& largest_method() const { return *methods_.back(); }
+  /// Not for the largest, and once a rung.
+  void add(std::uint32_t rung, const Method& method) { methods_[rung] = &method; }
+  std::uint32_t ready() const;
+
+  /// The smallest ready rung whose cells hold `wanted`; if none does, the largest, with the part of
+  /// `wanted` that it holds, rounded down.
+  Choice choose(const Reach& wanted) const;
+  /// For an observer that moves by `pace` while a PVS is in use, `hold_us` past its pose: an
+  /// upright cylinder. Told nothing, or with hold_us 0 (not known yet), the largest.
+  Choice choose(const Pace& pace, std::uint32_t hold_us) const;
+
+ private:
+  std::vector<Reach> reaches_;
+  double slack_m_;
+  std::vector<std::atomic<const Method*>> methods_;
+};
+
+/// `count` reaches up to `largest`, each kLadderStep of the next in its horizontal extents; the
+/// vertical extent stays, as it costs next to nothing, but for balls, which stay balls.
+inline constexpr double kLadderStep = 0.625;
+std::vector<Reach> ladder_below(const Reach& largest, std::size_t count);
+
+/// A ladder as in a configuration: "auto" (four by ladder_below), "none", or reaches separated by
+/// blanks, ascending, to which `largest` is added if it is not the last.
+/// Errors: kInvalidArgument naming the reach and what is wrong.
+Result<std::vector<Reach>> parse_ladder(std::string_view text, const Reach& largest,
+                                        double slack_m);
+
+}  // namespace ivis::server
