@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <exception>
-#include <new>
 #include <utility>
 
 #include "client_lib/client.h"
@@ -19,6 +18,8 @@ ivis::Vec3 vec(const double p[3]) {
 
 constexpr const char* kBadPace =
     "a pace out of bounds, expected speeds of 0 to 1e6 m/s and frames of 0 to 3600 s";
+
+constexpr std::uint32_t kMostLingerFrames = 3600;
 
 ivis::Pace pace_of(const ivis_pace& p) {
   return {p.horizontal_m_s, p.vertical_m_s, p.frame_s};
@@ -67,6 +68,10 @@ ivis_status ivis_client_connect(const ivis_client_options* options, ivis_client*
     if (options->policy < IVIS_POLICY_EVERYTHING || options->policy > IVIS_POLICY_INCOMPLETE)
       return refuse(IVIS_ERROR_ARGUMENT,
                     "unknown policy " + std::to_string(static_cast<int>(options->policy)));
+    if (options->linger_frames > kMostLingerFrames)
+      return refuse(IVIS_ERROR_ARGUMENT, std::to_string(options->linger_frames) +
+                                             " frames to linger, at most " +
+                                             std::to_string(kMostLingerFrames));
     if (options->connect_timeout_ms < 0 || options->silence_timeout_ms <= 0)
       return refuse(IVIS_ERROR_ARGUMENT, "a timeout is negative or zero");
     ivis::client::NetworkOptions network;
@@ -107,7 +112,11 @@ ivis_client* ivis_client_adopt_source_(void* pvs_source, ivis_policy policy) {
       static_cast<ivis::client::PvsSource*>(pvs_source));
   ivis_client::Options own;
   own.policy = policy;
-  return new (std::nothrow) ivis_client(std::move(source), std::move(own));
+  try {
+    return new ivis_client(std::move(source), std::move(own));
+  } catch (const std::exception&) {
+    return nullptr;
+  }
 }
 
 void ivis_client_close(ivis_client* client) {
@@ -144,8 +153,15 @@ ivis_status ivis_client_view(ivis_client* client, const double eye[3], ivis_fram
   if (out == nullptr) return IVIS_ERROR_ARGUMENT;
   *out = ivis_frame{};
   out->everything = 1;
+  out->cell_reach = "";
   if (client == nullptr || eye == nullptr) return IVIS_ERROR_ARGUMENT;
-  return guarded(client, [&] { return client->view(vec(eye), *out); });
+  const ivis_status status = guarded(client, [&] { return client->view(vec(eye), *out); });
+  if (out->object_count != 0 && out->visible_bits == nullptr) {  // out of memory half way
+    *out = ivis_frame{};
+    out->everything = 1;
+    out->cell_reach = "";
+  }
+  return status;
 }
 
 ivis_status ivis_client_frame(ivis_client* client, const double eye[3], ivis_frame* out) {
@@ -169,7 +185,7 @@ ivis_status ivis_client_info(const ivis_client* client, ivis_info* out) {
   *out = ivis_info{0, 0, "", ""};
   const Catalogue* c = client->source().catalogue();
   if (c == nullptr) return IVIS_ERROR_CONNECTION;
-  *out = {c->scene_hash, c->objects(), client->largest_reach(), c->method.c_str()};
+  *out = {c->scene_hash, c->objects(), c->largest_reach.c_str(), c->method.c_str()};
   return IVIS_OK;
 }
 
@@ -232,7 +248,7 @@ const char* ivis_cause_name(ivis_cause cause) {
     case IVIS_CAUSE_LATE:
       return "late";
     case IVIS_CAUSE_OTHER:
-      return "not measured";
+      return "other";
   }
   return "unknown";
 }

@@ -91,13 +91,6 @@ void ivis_client::set_pace(const ivis::Pace& pace) {
   source_->set_pace(pace);
 }
 
-const char* ivis_client::largest_reach() const {
-  const ivis::client::Catalogue* c = source_->catalogue();
-  if (c == nullptr) return nullptr;
-  largest_reach_ = c->reaches.back().to_string();
-  return largest_reach_.c_str();
-}
-
 const ivis_client::Sent* ivis_client::sent(std::uint32_t sequence) const {
   const Sent& s = sent_[sequence % sent_.size()];
   return sequence != 0 && s.sequence == sequence ? &s : nullptr;
@@ -132,8 +125,13 @@ ivis_status ivis_client::pose(const Vec3& eye) {
   if (options_.predict && before != nullptr && now > before->at) {
     // To the middle of where the PVS will be in use, if the observer goes on as it went.
     const Vec3 velocity = (eye - before->eye) / seconds(now - before->at);
-    const Vec3 ahead = velocity * (seconds(clock_.latency() + clock_.hold()) / 2);
-    if (finite(ahead)) centre += ahead;
+    Vec3 ahead = velocity * (seconds(clock_.latency() + clock_.hold()) / 2);
+    // A leap is no velocity: what no cell could hold is not gone towards.
+    const ivis::client::Catalogue* c = source_->catalogue();
+    const double most = c != nullptr ? c->reaches.back().half_extents().x : 0;
+    const double length = glm::length(ahead);
+    if (std::isfinite(length) && length > most) ahead *= most / length;
+    if (std::isfinite(length) && finite(eye + ahead)) centre = eye + ahead;
   }
   ++sequence_;
   ++stats_.poses;
@@ -212,12 +210,18 @@ ivis_status ivis_client::view(const Vec3& eye, ivis_frame& out) {
   const bool fresh = answer_.sequence != in_use_;
   if (const auto sessions = source_->stats().reconnects; sessions != stats_.reconnects) {
     stats_.reconnects = sessions;
+    met_ = now;
     clock_.interrupt();  // how long it was away says nothing of how long answers take
   }
-  if (fresh && sent(answer_.sequence) != nullptr)
-    clock_.begins(sent(answer_.sequence)->at, now);
-  else if (has_pvs)
+  if (fresh) {
+    const Sent* s = sent(answer_.sequence);
+    if (s != nullptr && s->at >= met_)
+      clock_.begins(s->at, now);
+    else
+      clock_.interrupt();
+  } else if (has_pvs) {
     clock_.used(now);
+  }
   in_use_ = answer_.sequence;
 
   // A PVS that lists everything is complete wherever the eye is.

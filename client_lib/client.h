@@ -36,8 +36,6 @@ struct ivis_client {
   void set_pace(const ivis::Pace& pace);
 
   const ivis::client::PvsSource& source() const { return *source_; }
-  /// Null until the catalogue is known. Valid until the next call.
-  const char* largest_reach() const;
   const std::string& error() const { return error_; }
   ivis_stats stats() const;
 
@@ -61,7 +59,7 @@ struct ivis_client {
   ivis::client::Lingering lingering_;
   std::uint32_t in_use_ = 0;  ///< sequence of the answer that the last view took
   std::string cell_reach_;
-  mutable std::string largest_reach_;
+  Time met_{};  ///< when the present session was first noticed
   ivis::client::Answer answer_;
   ivis::client::IdBits all_;
   std::uint32_t sequence_ = 0;

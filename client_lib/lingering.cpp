@@ -6,30 +6,31 @@ namespace ivis::client {
 
 const IdBits& Lingering::draw(const IdBits& pvs, bool fresh) {
   ++frame_;
-  bool changed = fresh;
   if (fresh) {
     pvs_.resize(pvs.size());
-    Leaving left{frame_ + frames_, IdBits(pvs.size())};
-    bool any = false;
+    drawn_.resize(pvs.size());
+    until_.resize(pvs.size() * 64);
     for (std::size_t w = 0; w < pvs.size(); ++w) {
-      left.bits[w] = pvs_[w] & ~pvs[w];
-      any = any || left.bits[w] != 0;
+      for (std::uint64_t left = pvs_[w] & ~pvs[w]; left != 0; left &= left - 1) {
+        const std::size_t id = w * 64 + static_cast<std::size_t>(std::countr_zero(left));
+        until_[id] = frame_ + frames_;
+        leaving_.emplace_back(until_[id], static_cast<ObjectId>(id));
+      }
+      for (std::uint64_t back = pvs[w] & ~pvs_[w] & drawn_[w]; back != 0; back &= back - 1)
+        until_[w * 64 + static_cast<std::size_t>(std::countr_zero(back))] = 0;
+      count_ += static_cast<std::uint32_t>(std::popcount(pvs[w] & ~drawn_[w]));
+      drawn_[w] |= pvs[w];
     }
-    if (any) leaving_.push_back(std::move(left));
     pvs_ = pvs;
   }
-  while (!leaving_.empty() && leaving_.front().until <= frame_) {
+  while (!leaving_.empty() && leaving_.front().first <= frame_) {
+    const auto [until, id] = leaving_.front();
     leaving_.pop_front();
-    changed = true;
+    if (until_[id] != until) continue;  // it came back meanwhile
+    until_[id] = 0;
+    drawn_[id >> 6U] &= ~(std::uint64_t{1} << (id & 63U));
+    --count_;
   }
-  if (!changed) return drawn_;
-  drawn_ = pvs_;
-  for (const Leaving& l : leaving_)
-    for (std::size_t w = 0; w < drawn_.size() && w < l.bits.size(); ++w)
-      drawn_[w] |= l.bits[w];
-  count_ = 0;
-  for (const std::uint64_t word : drawn_)
-    count_ += static_cast<std::uint32_t>(std::popcount(word));
   return drawn_;
 }
 

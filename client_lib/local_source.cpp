@@ -135,6 +135,7 @@ Catalogue catalogue_of(const Scene& scene, const Reach& reach, const Method& met
   Catalogue c;
   c.scene_hash = scene.hash;
   c.reaches = {reach};
+  c.largest_reach = reach.to_string();
   c.method = method.traits().name;
   for (const Object& o : scene.objects) {
     c.node.push_back(o.node);

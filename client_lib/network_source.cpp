@@ -156,7 +156,9 @@ struct NetworkSource::Impl {
           (w.table.cluster.empty() ? "" : ", which is split into clusters (granularity cluster)")));
     std::vector<Reach> reaches;
     for (const std::string& text : w.reaches)
-      if (auto reach = Reach::parse(text)) reaches.push_back(*reach);
+      if (auto reach = Reach::parse(text);
+          reach && (reaches.empty() || reach->contains(reaches.back(), kReachToleranceM)))
+        reaches.push_back(*reach);
     if (w.session == 0 || reaches.empty() || reaches.size() != w.reaches.size() ||
         w.table.id.size() != w.objects || w.table.node.size() != w.objects ||
         w.table.instance.size() != w.objects ||
@@ -167,6 +169,7 @@ struct NetworkSource::Impl {
     }
     Catalogue told;
     told.scene_hash = w.scene_hash;
+    told.largest_reach = reaches.back().to_string();
     told.reaches = std::move(reaches);
     told.method = w.method;
     told.node.resize(w.objects);

@@ -46,6 +46,8 @@ Result<ReplayReport> replay(const std::string& endpoint, const client::Record& r
   client::NetworkOptions network;
   network.endpoint = endpoint;
   network.scene_hash = record.scene_hash;
+  network.strategy = options.strategy;
+  network.budget_us = static_cast<std::uint32_t>(1e3 * std::clamp(options.budget_ms, 0.0, 1e6));
   const auto wanted = [](const client::RecordedFrame& f) {
     return f.sequence != 0 && (f.covered || !f.everything);
   };

@@ -6,6 +6,7 @@
 
 #include "client_lib/record.h"
 #include "core/context.h"
+#include "core/strategy.h"
 
 namespace ivis {
 
@@ -13,6 +14,8 @@ struct ReplayOptions {
   int connect_timeout_ms = 5000;
   int answer_timeout_ms = 10000;  ///< of one pose
   std::size_t most_listed = 20;
+  std::optional<Strategy> strategy;  ///< as the walk wished; none: the server's
+  double budget_ms = 0;
 };
 
 /// An answer that is not the recorded one.

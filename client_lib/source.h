@@ -24,6 +24,7 @@ inline std::size_t words_for(std::size_t objects) {
 struct Catalogue {
   SceneHash scene_hash = 0;
   std::vector<Reach> reaches;  ///< what cells may be, ascending
+  std::string largest_reach;   ///< the last of them
   std::string method;
   std::vector<std::uint32_t> node;      ///< by id
   std::vector<std::uint32_t> instance;  ///< by id

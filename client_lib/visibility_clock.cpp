@@ -7,21 +7,17 @@ namespace ivis::client {
 
 void VisibilityClock::Window::add(Duration d) {
   if (d < Duration::zero()) return;
-  if (ring_.size() < kWindow) {
-    ring_.push_back(d);
-    return;
+  if (ring.size() < kWindow) {
+    ring.push_back(d);
+  } else {
+    ring[next] = d;
+    next = (next + 1) % kWindow;
   }
-  ring_[next_] = d;
-  next_ = (next_ + 1) % kWindow;
-}
-
-VisibilityClock::Duration VisibilityClock::Window::quantile() const {
-  if (ring_.empty()) return Duration::zero();
-  std::vector<Duration> sorted = ring_;
+  std::vector<Duration> sorted = ring;
   const auto rank =
       static_cast<std::ptrdiff_t>(std::ceil(kQuantile * static_cast<double>(sorted.size())) - 1);
   std::nth_element(sorted.begin(), sorted.begin() + rank, sorted.end());
-  return sorted[static_cast<std::size_t>(rank)];
+  quantile = sorted[static_cast<std::size_t>(rank)];
 }
 
 void VisibilityClock::begins(Time sent, Time now) {
@@ -29,7 +25,7 @@ void VisibilityClock::begins(Time sent, Time now) {
   if (in_use_) {
     interval_.add(sent - sent_);
     holds_.add(last_used_ - sent_);
-    if (holds_.size() >= kLeast) hold_ = std::max(holds_.quantile(), Duration{1});
+    if (holds_.ring.size() >= kLeast) hold_ = std::max(holds_.quantile, Duration{1});
   }
   in_use_ = true;
   sent_ = sent;

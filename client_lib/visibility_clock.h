@@ -37,19 +37,15 @@ class VisibilityClock {
 
   /// What the next PVS must hold for; zero until kLeast have been replaced, never after.
   Duration hold() const { return hold_; }
-  Duration latency() const { return latency_.quantile(); }    ///< L
-  Duration interval() const { return interval_.quantile(); }  ///< T
+  Duration latency() const { return latency_.quantile; }    ///< L
+  Duration interval() const { return interval_.quantile; }  ///< T
 
  private:
-  class Window {
-   public:
+  struct Window {
     void add(Duration d);
-    Duration quantile() const;
-    std::size_t size() const { return ring_.size(); }
-
-   private:
-    std::vector<Duration> ring_;
-    std::size_t next_ = 0;
+    std::vector<Duration> ring;
+    std::size_t next = 0;
+    Duration quantile{0};
   };
   Window latency_, interval_, holds_;
   Duration hold_{0};

@@ -159,9 +159,10 @@ class Played {
 
 Status check_times(const std::vector<Pose>& path) {
   if (path.size() < 2) return invalid_argument("a walk in real time along a path of one pose");
+  constexpr double kMostSeconds = 1e6;
   for (std::size_t i = 1; i < path.size(); ++i)
-    if (!(path[i].t > path[i - 1].t) || !std::isfinite(path[i].t))
-      return invalid_argument("a walk in real time needs times that ascend: pose " +
+    if (!(path[i].t > path[i - 1].t) || !(path[i].t - path[0].t <= kMostSeconds))
+      return invalid_argument("a walk in real time needs times that ascend, within 1e6 s: pose " +
                               std::to_string(i) + " has t " + std::to_string(path[i].t) +
                               " after " + std::to_string(path[i - 1].t));
   return ok();
@@ -171,7 +172,7 @@ Status check_times(const std::vector<Pose>& path) {
 class Walker {
  public:
   Walker(VisibilityClient client, const ivis_info& info, const WalkOptions& options)
-      : client_(std::move(client)), options_(options), recorder_(record_), start_(Clock::now()) {
+      : client_(std::move(client)), options_(options), recorder_(record_) {
     record_.scene_hash = info.scene_hash;
     record_.objects = info.object_count;
     if (auto reach = Reach::parse(info.reach)) record_.reach = *reach;
@@ -179,7 +180,8 @@ class Walker {
   VisibilityClient& client() { return client_; }
 
   /// Accounts for a frame that was drawn.
-  Status drawn(const PvsView& view, const Vec3& wanted) {
+  Status drawn(const PvsView& view, const Vec3& wanted, Clock::time_point at) {
+    if (!start_) start_ = at;
     if (client_.status() != IVIS_OK) return error_of(client_.status(), client_.error());
     const ivis_stats stats = client_.stats();
     samples_.bytes.push_back(static_cast<double>(stats.bytes - before_.bytes));
@@ -203,7 +205,7 @@ class Walker {
     before_ = stats;
     if (options_.record_file)
       record_frame(recorder_, view, wanted, record_.reach,
-                   std::chrono::duration<double>(Clock::now() - start_).count());
+                   std::chrono::duration<double>(at - *start_).count());
     return ok();
   }
 
@@ -230,7 +232,7 @@ class Walker {
   const WalkOptions& options_;
   client::Record record_;
   client::Recorder recorder_;
-  Clock::time_point start_;
+  std::optional<Clock::time_point> start_;  ///< the first frame
   Samples samples_;
   ivis_stats before_{};
 };
@@ -248,6 +250,7 @@ Status walk_rows(Walker& walker, const std::string& endpoint, const std::vector<
     if (context.stopped()) return cancelled();
     const double eye[3]{path[i].eye.x, path[i].eye.y, path[i].eye.z};
     std::optional<PvsView> view;
+    auto drawn_at = Clock::now();
     if (options.hz == 0) {
       static_cast<void>(client.pose(eye));
       if (const ivis_status s = client.wait(options.answer_timeout_ms); s != IVIS_OK)
@@ -256,9 +259,10 @@ Status walk_rows(Walker& walker, const std::string& endpoint, const std::vector<
     } else {
       std::this_thread::sleep_until(next);
       next += period;
+      drawn_at = Clock::now();
       view = client.frame(eye);
     }
-    if (auto s = walker.drawn(*view, path[i].eye); !s) return s;
+    if (auto s = walker.drawn(*view, path[i].eye, drawn_at); !s) return s;
     context.report("walking", i + 1, path.size());
     if (on_frame) on_frame(walker.progress(i + 1, path.size()));
   }
@@ -278,15 +282,15 @@ Status walk_in_real_time(Walker& walker, const std::string& endpoint, const Play
     return unanswered(s) ? no_answer(endpoint, client.error()) : error_of(s, client.error());
   const double seconds = options.seconds > 0 ? options.seconds : path.seconds();
   const auto frames = static_cast<std::size_t>(std::ceil(seconds * options.fps));
-  const auto period = std::chrono::duration<double>(1 / options.fps);
-  const auto start = Clock::now();
-  std::size_t frame = 0;  // of `frames`; late ones are passed over
-  double played = 0;      // seconds of the path
-  while (frame < frames) {
+  const std::chrono::duration<double> period(1 / options.fps);
+  const auto due = [&, start = Clock::now()](std::size_t f) {
+    return start + std::chrono::duration_cast<Clock::duration>(period * static_cast<double>(f));
+  };
+  double played = 0;  // seconds of the path
+  auto last = Clock::now();
+  // Once along the path takes longer with a limit, or where the eye is held.
+  for (std::size_t frame = 0; options.seconds > 0 ? frame < frames : played < path.seconds();) {
     if (context.stopped()) return cancelled();
-    const auto due = [&](std::size_t f) {
-      return start + std::chrono::duration_cast<Clock::duration>(period * static_cast<double>(f));
-    };
     // Between frames the answer is taken in as it comes, so that its time is right.
     while (Clock::now() + std::chrono::milliseconds(1) < due(frame)) {
       const auto left =
@@ -294,13 +298,13 @@ Status walk_in_real_time(Walker& walker, const std::string& endpoint, const Play
       if (client.wait(static_cast<int>(left.count())) == IVIS_OK) break;
     }
     std::this_thread::sleep_until(due(frame));
-    const auto reached =
-        static_cast<std::size_t>(std::chrono::duration<double>(Clock::now() - start) / period);
-    const std::size_t passed = std::max<std::size_t>(reached, frame) - frame;
-    const double step = frame == 0 ? 0 : static_cast<double>(passed + 1) * period.count();
-    frame += passed + 1;
+    const auto now = Clock::now();
+    const double step = std::chrono::duration<double>(now - last).count();
+    last = now;
+    while (due(frame) <= now)
+      ++frame;  // late ones are passed over
     double ahead = step;
-    for (int i = 0; i < 8; ++i) {
+    for (int i = 0; i < 8 && step > 0; ++i) {
       const Vec3 d = path.at(played + ahead) - at;
       const double over = std::hypot(d.x, d.z) / (pace.horizontal_m_s * step);
       if (!(over > 1)) break;
@@ -308,15 +312,19 @@ Status walk_in_real_time(Walker& walker, const std::string& endpoint, const Play
     }
     const Vec3 wanted = path.at(played + ahead);
     const PvsView view = client.frame({wanted.x, wanted.y, wanted.z});
-    if (auto s = walker.drawn(view, wanted); !s) return s;
+    if (auto s = walker.drawn(view, wanted, now); !s) return s;
     if (!view.stalled()) {
       played += ahead;
       at = wanted;
     } else {
       at = vec(view.eye());
     }
-    context.report("walking", std::min(frame, frames), frames);
-    if (on_frame) on_frame(walker.progress(std::min(frame, frames), frames));
+    const std::size_t done = options.seconds > 0
+                                 ? std::min(frame, frames)
+                                 : static_cast<std::size_t>(std::min(played / path.seconds(), 1.0) *
+                                                            static_cast<double>(frames));
+    context.report("walking", done, frames);
+    if (on_frame) on_frame(walker.progress(std::max<std::size_t>(done, 1), frames));
   }
   return ok();
 }

@@ -25,7 +25,7 @@ struct WalkOptions {
   /// observer's fastest speed is told to the server. Where the eye is held the walk waits. Excludes
   /// hz.
   double fps = 0;
-  /// With fps: how long, there and back again; 0: once along the path.
+  /// With fps: how long, there and back again; 0: once along the path, however long that takes.
   double seconds = 0;
   /// With fps: the fastest horizontal speed, which is told and kept to; 0: the path's own.
   double speed_limit_m_s = 0;

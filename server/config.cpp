@@ -159,8 +159,9 @@ const std::vector<Key>& keys() {
        get_text(&Config::reach),
        set_reach},
       {{"ladder", "R...",
-        "smaller reaches, ascending, for observers that say how fast they move: 'auto' makes four "
-        "of the reach, 'none' none"},
+        "smaller reaches, ascending, for observers that say how fast they move, shrunk here as by "
+        "`ivis shrink` without options; 'auto': four of the reach, or, with --occluders, none; "
+        "'none'"},
        Kind::kText,
        get_text(&Config::ladder),
        set_ladder},

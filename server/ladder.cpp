@@ -48,22 +48,31 @@ Ladder::Choice Ladder::choose(const Reach& wanted) const {
     if (const Method* m = methods_[i]; m != nullptr && serves(reaches_[i], slack_m_, wanted))
       return {i, m, 1};
   const auto last = static_cast<std::uint32_t>(reaches_.size() - 1);
+  return {last, methods_[last], safe_part(reaches_[last], wanted)};
+}
+
+double Ladder::safe_part(const Reach& reach, const Reach& wanted) const {
+  if (serves(reach, slack_m_, wanted)) return 1;
   const Vec3 e = wanted.half_extents();
   double safe = 0;
   double not_safe = 1;
   for (int i = 0; i < 24; ++i) {
     const double middle = (safe + not_safe) / 2;
     const Reach part = Reach::cylinder(e.x * middle, e.y * middle);
-    (serves(reaches_[last], slack_m_, part) ? safe : not_safe) = middle;
+    (serves(reach, slack_m_, part) ? safe : not_safe) = middle;
   }
-  return {last, methods_[last], safe};
+  return safe;
+}
+
+Reach reach_of(const Pace& pace, std::uint32_t hold_us) {
+  const double hold_s = hold_us * 1e-6;
+  return Reach::cylinder(pace.horizontal_m_s * hold_s, pace.vertical_m_s * hold_s);
 }
 
 Ladder::Choice Ladder::choose(const Pace& pace, std::uint32_t hold_us) const {
   if (!pace.told() || hold_us == 0)
     return {static_cast<std::uint32_t>(reaches_.size() - 1), methods_.back(), 1};
-  const double hold_s = hold_us * 1e-6;
-  return choose(Reach::cylinder(pace.horizontal_m_s * hold_s, pace.vertical_m_s * hold_s));
+  return choose(reach_of(pace, hold_us));
 }
 
 std::vector<Reach> ladder_below(const Reach& largest, std::size_t count) {

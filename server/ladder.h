@@ -41,11 +41,12 @@ class Ladder {
   void add(std::uint32_t rung, const Method& method) { methods_[rung] = &method; }
   std::uint32_t ready() const;
 
+  /// The part of `wanted` that cells of `reach` hold, rounded down; 1: all.
+  double safe_part(const Reach& reach, const Reach& wanted) const;
   /// The smallest ready rung whose cells hold `wanted`; if none does, the largest, with the part of
   /// `wanted` that it holds, rounded down.
   Choice choose(const Reach& wanted) const;
-  /// For an observer that moves by `pace` while a PVS is in use, `hold_us` past its pose: an
-  /// upright cylinder. Told nothing, or with hold_us 0 (not known yet), the largest.
+  /// For reach_of(pace, hold_us). Told nothing, or with hold_us 0 (not known yet), the largest.
   Choice choose(const Pace& pace, std::uint32_t hold_us) const;
 
  private:
@@ -53,6 +54,10 @@ class Ladder {
   double slack_m_;
   std::vector<std::atomic<const Method*>> methods_;
 };
+
+/// Where an observer may get to at `pace` while a PVS is in use, `hold_us` past its pose: an
+/// upright cylinder.
+Reach reach_of(const Pace& pace, std::uint32_t hold_us);
 
 /// `count` reaches up to `largest`, each kLadderStep of the next in its horizontal extents; the
 /// vertical extent stays, as it costs next to nothing, but for balls, which stay balls.

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <exception>
 #include <iostream>
 #include <map>
 #include <optional>
@@ -124,6 +125,36 @@ int check(const Configured& configured) {
   return kOk;
 }
 
+/// Builds the smaller rungs beside the server; ends, at the latest, when it goes.
+class Builder {
+ public:
+  Builder(World& world, Ladder& ladder, const WorldOptions& options, Log& log)
+      : thread_([&world, &ladder, &options, &log] {
+          Context quiet;
+          quiet.stop = &stop_requested;
+          const Status built = [&]() -> Status {
+            try {
+              return build_rungs(world, ladder, options, quiet);
+            } catch (const std::exception& e) {  // out of memory costs rungs, not the daemon
+              return unsupported(e.what());
+            }
+          }();
+          if (built && ladder.reaches().size() > 1)
+            log.info("ladder", {{"rungs", ladder.ready()}});
+          else if (!built && built.error().code != ErrorCode::kCancelled)
+            log.warn("ladder", {{"rungs", ladder.ready()}, {"reason", built.error().message}});
+        }) {}
+  ~Builder() {
+    stop_requested = true;
+    thread_.join();
+  }
+  Builder(const Builder&) = delete;
+  Builder& operator=(const Builder&) = delete;
+
+ private:
+  std::thread thread_;
+};
+
 int serve(const Config& config) {
   Log log(config.log_level, config.json_logs);
   // Asked before the loading, which can take long, and again by the bind below.
@@ -159,7 +190,10 @@ int serve(const Config& config) {
     return report(input_error("'" + config.scene.string() + "' has " +
                               std::to_string(w.scene.object_count()) +
                               " objects, more than a message can name"));
-  auto reaches = parse_ladder(config.ladder, w.reach, w.occluders.slack_m);
+  // An occluder file may know more than what is shrunk here (voxels, polyhedra): its ladder has to
+  // be asked for.
+  const bool given = !config.occluders.empty() && config.ladder == "auto";
+  auto reaches = parse_ladder(given ? "none" : config.ladder, w.reach, w.occluders.slack_m);
   if (!reaches) return report(reaches.error());
   Ladder ladder(std::move(*reaches), *w.method, w.occluders.slack_m);
   const ServedScene served = served_scene(w.scene);
@@ -175,7 +209,9 @@ int serve(const Config& config) {
     log.warn("strategy", {{"strategy", to_string(config.strategy)},
                           {"reason", w.method->traits().name + " keeps to no budget"}});
   const CostModel cost = calibrate(*w.method, w.scene, w.reach, &stop_requested);
-  if (w.method->keeps_to_effort())
+  if (w.method->keeps_to_effort() && !(cost.draw_ms > 0 && cost.test_ms > 0))
+    log.warn("calibrated", {{"reason", "too few places in the scene: budgets may bound nothing"}});
+  else if (w.method->keeps_to_effort())
     log.info("calibrated", {{"fixed_ms", cost.fixed_ms},
                             {"draw_us", 1e3 * cost.draw_ms},
                             {"test_us", 1e3 * cost.test_ms}});
@@ -185,18 +221,10 @@ int serve(const Config& config) {
     return kConnection;
   }
   log.info("listening", {{"address", (*server)->endpoint()}});
-  std::thread builder([&] {
-    Context quiet;
-    quiet.stop = &stop_requested;
-    const auto built = build_rungs(w, ladder, wanted, quiet);
-    if (built && ladder.reaches().size() > 1)
-      log.info("ladder", {{"rungs", ladder.ready()}});
-    else if (!built && built.error().code != ErrorCode::kCancelled)
-      log.warn("ladder", {{"rungs", ladder.ready()}, {"reason", built.error().message}});
-  });
-  (*server)->run(stop_requested);
-  stop_requested = true;
-  builder.join();
+  {
+    const Builder builder(w, ladder, wanted, log);
+    (*server)->run(stop_requested);
+  }
   return kOk;
 }
 

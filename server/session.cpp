@@ -222,11 +222,11 @@ std::vector<std::byte> SessionTable::welcome(Session& session) {
 }
 
 Ladder::Choice SessionTable::choose(const Session& session, std::uint32_t hold_us) const {
-  if (session.reach) {
-    Ladder::Choice choice = ladder_.choose(*session.reach);
-    choice.rung = 0;  // of the only one the client was told
-    return choice;
-  }
+  // A named reach always by the same occluders: equal poses get equal sets.
+  if (session.reach)
+    return {0, &ladder_.largest_method(),
+            session.pace.told() ? ladder_.safe_part(*session.reach, reach_of(session.pace, hold_us))
+                                : 1};
   return ladder_.choose(session.pace, hold_us);
 }
 

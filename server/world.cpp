@@ -85,8 +85,8 @@ Status build_rungs(World& world, Ladder& ladder, const WorldOptions& options,
     auto made = make(method, world.scene, rung->occluders, options);
     if (!made) return made.error();
     rung->method = std::move(*made);
-    ladder.add(static_cast<std::uint32_t>(i), *rung->method);
     world.rungs.push_back(std::move(rung));
+    ladder.add(static_cast<std::uint32_t>(i), *world.rungs.back()->method);
   }
   return ok();
 }

@@ -11,19 +11,24 @@ namespace {
 struct ReplayArgs {
   std::filesystem::path record;
   std::string endpoint;
+  std::string strategy;
+  double budget_ms = 0;
   bool json = false;
 };
 
 Outcome run_replay(const ReplayArgs& args) {
   const auto record = client::read_record(args.record);
   if (!record) return record.error();
-  const auto r = replay(args.endpoint, *record, {}, make_context(args.json));
+  ReplayOptions options;
+  options.strategy = parse_strategy(args.strategy);
+  options.budget_ms = args.budget_ms;
+  const auto r = replay(args.endpoint, *record, options, make_context(args.json));
   if (!r) {
     if (r.error().code == ErrorCode::kInput)
       return input_error("'" + args.record.string() + "': " + r.error().message);
     return r.error();
   }
-  const bool good = r->different == 0 && r->same > 0;
+  const bool good = r->same == r->poses && r->poses > 0;
   if (args.json) {
     nlohmann::json differences = nlohmann::json::array();
     for (const ReplayDifference& d : r->differences)
@@ -58,6 +63,9 @@ void add_replay(CLI::App& app, std::function<Outcome()>& action) {
   sub->add_option("--connect", args->endpoint, "the daemon's address, as in tcp://127.0.0.1:7447")
       ->required()
       ->type_name("E");
+  sub->add_option("--strategy", args->strategy, "as the walk wished (default: the server's)")
+      ->check(CLI::IsMember({"guaranteed", "abort", "predictive"}));
+  sub->add_option("--budget-ms", args->budget_ms, "likewise")->check(number_within(0, 1e6));
   sub->add_flag("--json", args->json, "print JSON");
   sub->callback([&action, args] { action = [args] { return run_replay(*args); }; });
 }

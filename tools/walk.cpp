@@ -140,7 +140,7 @@ void add_walk(CLI::App& app, std::function<Outcome()>& action) {
   auto* fps = sub->add_option("--fps", args->fps,
                               "walk in real time, so many frames a second: the path is played by "
                               "its column t, and the server is told how fast that is")
-                  ->check(number_within(0, 1000));
+                  ->check(number_within(1, 1000));
   sub->add_option("--seconds", args->seconds,
                   "how long, there and back again (default: once along the path)")
       ->needs(fps)
@@ -155,8 +155,8 @@ void add_walk(CLI::App& app, std::function<Outcome()>& action) {
                   "drawing (default: the server's)")
       ->check(CLI::IsMember({"guaranteed", "abort", "predictive"}));
   sub->add_option("--budget-ms", args->budget_ms,
-                  "of one solve, for the latter two (default: the server's)")
-      ->check(number_within(0, 1e6));
+                  "of one solve, for abort and predictive (default: the server's)")
+      ->check(number_within(0.001, 1e6));
   sub->add_flag("--predict", args->predict,
                 "centre cells where the observer is going instead of where it is")
       ->needs(fps);
@@ -167,7 +167,7 @@ void add_walk(CLI::App& app, std::function<Outcome()>& action) {
       ->excludes(fps)
       ->check(number_within(0, 1000));
   sub->add_option("--record", args->record,
-                  "write what the client was told, for 'ivis verify --record'");
+                  "write what the client was told, for 'ivis verify --record' and 'ivis replay'");
   sub->add_flag("--json", args->json, "print JSON");
   sub->callback([&action, args] { action = [args] { return run_walk(*args); }; });
 }

@@ -72,13 +72,13 @@ Result<std::unique_ptr<Method>> make_occlusion_map(const Scene& scene, const Occ
 Result<std::unique_ptr<Method>> make_cull_map(const Scene& scene, const OccluderSet& occluders,
                                               const MethodOptions& options) {
   const bool asked = options.backend == Backend::kGl;
+  if (options.map == CullMapKind::kPolar && asked)
+    return invalid_argument(
+        "the polar cull map has no OpenGL backend; the orthographic one and the "
+        "occlusion map have");
   auto map = std::make_unique<CullMap>(scene, occluders, options);
-  if (options.map == CullMapKind::kPolar) {
-    if (asked)
-      return invalid_argument(
-          "the polar cull map has no OpenGL backend; the orthographic one and the "
-          "occlusion map have");
-  } else if (options.backend != Backend::kCpu && options.make_gl_shadows) {
+  if (options.map == CullMapKind::kPolar) return std::unique_ptr<Method>(std::move(map));
+  if (options.backend != Backend::kCpu && options.make_gl_shadows) {
     auto shadows = options.make_gl_shadows(*map->orthographic(), options.backend);
     if (shadows)
       map->draw_shadows_on(std::move(*shadows));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
@@ -70,6 +71,8 @@ struct CullMap::Scratch {
   Horizon horizon;
   OrthographicMap::Heights heights;
   std::vector<ShadowChain> chains;
+  std::vector<float> worth, ranked;  ///< of solids
+  std::vector<std::uint8_t> wanted;  ///< of solids; empty: all
   std::vector<std::uint32_t> visible;
   std::vector<std::uint64_t> bits;
 };
@@ -212,6 +215,12 @@ Result<Pvs> CullMap::solve(const ViewCell& cell, LastShown* last, const Effort& 
   scratch->visible.clear();
   if (auto drawn = draw_selected(eye, last, effort, *scratch, stats); !drawn) return drawn.error();
   find_objects(eye, effort, *scratch, stats);
+  // Where much is left untested the list would take longer than what it is worth.
+  if (stats.polar.untested > scene_.objects.size() / 4) {
+    list_everything(scene_, "the budget allows for no less", pvs);
+    give_back(std::move(scratch));
+    return pvs;
+  }
   list_ascending(scene_.objects.size(), scratch->visible, always_visible_, scratch->bits, pvs);
   give_back(std::move(scratch));
   return pvs;
@@ -220,8 +229,9 @@ Result<Pvs> CullMap::solve(const ViewCell& cell, LastShown* last, const Effort& 
 /// What MethodOptions::selection says. Drawing less is always safe.
 Status CullMap::draw_selected(const Eye& eye, LastShown* last, const Effort& effort,
                               Scratch& scratch, Stats& stats) const {
+  scratch.wanted.clear();
   if (effort.strategy == Strategy::kPredictive && !orthographic_)
-    return draw(eye, promising_solids(eye, effort.draw), effort, scratch, stats);
+    mark_promising(eye, effort, scratch, stats);
   if (last == nullptr || options_.selection == Selection::kConservative)
     return draw(eye, largest_solids(eye, nullptr), effort, scratch, stats);
   auto drawn = draw(eye, largest_solids(eye, last->known ? &last->occluders : nullptr), effort,
@@ -242,53 +252,44 @@ Status CullMap::draw(const Eye& eye, const Chosen& chosen, const Effort& effort,
   return ok();
 }
 
-/// Those that promise to hide most for their work, until that is spent; near ones first (after
-/// Funkhouser and Séquin 1993). Hidden is worth the projected area; drawing costs corners, and bins
-/// by the width.
-CullMap::Chosen CullMap::promising_solids(const Eye& eye, std::uint64_t work) const {
-  struct Candidate {
-    float worth;  ///< area over work
-    float distance;
-    std::uint32_t solid;
-    std::uint32_t work;
-  };
-  std::vector<Candidate> all;
-  all.reserve(walls_.solids.size());
+/// Marks those that promise to hide most for their work, the more of them the more of a full
+/// drawing the budget pays for (after Funkhouser and Séquin 1993). Hiding is worth the projected
+/// area; drawing costs corners, and bins by the width. What nearer ones hide is not drawn and costs
+/// nothing, so that the share counts, not the sum.
+void CullMap::mark_promising(const Eye& eye, const Effort& effort, Scratch& scratch,
+                             Stats& stats) const {
+  if (effort.draw >= effort.draw_in_full || walls_.solids.empty()) return;
+  stats.polar.nodes_searched += static_cast<std::uint32_t>(walls_.tree.nodes.size());
   const auto bins = static_cast<float>(4 * bins_a_face_ / PolarMap::kBlock);
   const float x = eye.single[0];
   const float z = eye.single[2];
+  std::vector<float>& worth = scratch.worth;
+  worth.assign(walls_.solids.size(), 0);
   for (const BoxTree::Node& node : walls_.tree.nodes)
     for (std::uint32_t c = 0; c < node.count; ++c) {
       if ((node.child[c] & BoxTree::kItem) == 0) continue;
       const std::uint32_t solid = node.child[c] & ~BoxTree::kItem;
       const float dx = std::max({node.lo_x[c] - x, x - node.hi_x[c], 0.0F});
       const float dz = std::max({node.lo_z[c] - z, z - node.hi_z[c], 0.0F});
-      const float d = std::max(std::sqrt(dx * dx + dz * dz), 0.1F);
-      const float width = std::hypot(node.hi_x[c] - node.lo_x[c], node.hi_z[c] - node.lo_z[c]);
-      const float turn = std::min(width / (6.2831853F * d), 1.0F);
+      const float d2 = std::max(dx * dx + dz * dz, 0.01F);
+      const float width = (node.hi_x[c] - node.lo_x[c]) + (node.hi_z[c] - node.lo_z[c]);
+      const float turn = std::min(width / (6.0F * std::sqrt(d2)), 1.0F);
       const float cost = static_cast<float>(corners_[solid]) + bins * turn;
-      all.push_back({turn * (node.hi_y[c] - node.lo_y[c]) / (d * cost), d, solid,
-                     static_cast<std::uint32_t>(cost)});
+      worth[solid] = width * (node.hi_y[c] - node.lo_y[c]) / (d2 * cost);
     }
-  const auto better = [](const Candidate& a, const Candidate& b) {
-    return a.worth != b.worth ? a.worth > b.worth : a.solid < b.solid;
-  };
-  // Only as many are sorted as the work may pay for.
-  std::size_t most = all.size();
-  if (work < most) most = static_cast<std::size_t>(work) + 1;
-  const auto end = all.begin() + static_cast<std::ptrdiff_t>(std::min(most, all.size()));
-  std::partial_sort(all.begin(), end, all.end(), better);
-  std::uint64_t spent = 0;
-  auto it = all.begin();
-  while (it != end && spent + it->work <= work)
-    spent += (it++)->work;
-  std::sort(all.begin(), it, [](const Candidate& a, const Candidate& b) {
-    return a.distance != b.distance ? a.distance < b.distance : a.solid < b.solid;
-  });
-  std::vector<std::uint32_t> chosen;
-  for (auto i = all.begin(); i != it; ++i)
-    chosen.push_back(i->solid);
-  return chosen;
+  const std::uint64_t spent = stats.polar.draw_work();
+  const double left = static_cast<double>(effort.draw > spent ? effort.draw - spent : 0);
+  const double share = left / static_cast<double>(effort.draw_in_full);
+  const auto count = static_cast<std::size_t>(share * static_cast<double>(worth.size()));
+  scratch.wanted.assign(worth.size(), 0);
+  if (count == 0) return;
+  scratch.ranked = worth;
+  std::nth_element(scratch.ranked.begin(),
+                   scratch.ranked.begin() + static_cast<std::ptrdiff_t>(count - 1),
+                   scratch.ranked.end(), std::greater<>());
+  const float least = scratch.ranked[count - 1];
+  for (std::size_t s = 0; s < worth.size(); ++s)
+    scratch.wanted[s] = worth[s] >= least ? 1 : 0;
 }
 
 /// The options_.max_occluders solids of largest projected area (width times height over distance
@@ -346,12 +347,12 @@ void CullMap::draw_polar(const Eye& eye, const Chosen& chosen, const Effort& eff
     terrain_->draw(eye.single, scratch.horizon);
     if (!scratch.horizon.empty()) scratch.polar.set_horizon(&scratch.horizon);
   }
-  if (!chosen)
-    draw_walls(walls_, eye.single, eye.floors, {}, guards_, effort.draw, scratch.polar,
-               stats.polar);
-  else if (!chosen->empty())
-    draw_walls(walls_, eye.single, eye.floors, *chosen, guards_, effort.draw, scratch.polar,
-               stats.polar);
+  DrawLimits limits;
+  limits.wanted = scratch.wanted;
+  limits.most = effort.draw;
+  if (chosen) limits.only = *chosen;
+  if (!chosen || !chosen->empty())
+    draw_walls(walls_, eye.single, eye.floors, limits, guards_, scratch.polar, stats.polar);
   scratch.polar.finish(eye.floors.undersides);
 }
 

@@ -54,7 +54,8 @@ class CullMap : public Method {
   Result<Pvs> solve(const ViewCell& cell, const Effort& effort, Work& done) const override;
   bool keeps_to_effort() const override { return !orthographic_; }
   Result<Pvs> solve(const ViewCell& cell, Stats& stats) const;
-  /// No solve draws or tests more: all walls, near and far, each over all bins; all nodes.
+  /// No solve draws or tests more, but those by LastShown: all walls, each over all bins; all
+  /// nodes.
   Work most_work() const;
 
   static MethodTraits make_traits();
@@ -69,7 +70,7 @@ class CullMap : public Method {
   Result<Pvs> solve(const ViewCell& cell, LastShown* last, const Effort& effort,
                     Stats& stats) const;
   Chosen largest_solids(const Eye& eye, const std::vector<std::uint32_t>* among) const;
-  Chosen promising_solids(const Eye& eye, std::uint64_t work) const;
+  void mark_promising(const Eye& eye, const Effort& effort, Scratch& scratch, Stats& stats) const;
   Status draw_selected(const Eye& eye, LastShown* last, const Effort& effort, Scratch& scratch,
                        Stats& stats) const;
   Status draw(const Eye& eye, const Chosen& chosen, const Effort& effort, Scratch& scratch,

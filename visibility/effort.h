@@ -12,9 +12,13 @@ namespace ivis {
 struct Effort {
   static constexpr std::uint64_t kUnbounded = std::numeric_limits<std::uint64_t>::max();
   Strategy strategy = Strategy::kGuaranteed;
-  /// A solve goes over it by less than one occluder and one node of a tree.
+  /// A solve goes over it by less than one occluder and one node of a tree. Terrain, which is drawn
+  /// whole and first, and the listing of what shows are not counted.
   std::uint64_t draw = kUnbounded;
   std::uint64_t test = kUnbounded;
+  /// For kPredictive: what drawing without a budget takes, by which it judges how much to choose;
+  /// 0: not known, all are chosen.
+  std::uint64_t draw_in_full = 0;
 };
 
 /// What it did.

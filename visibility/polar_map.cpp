@@ -651,9 +651,8 @@ View make_view(const float eye[3], const PolarMap& map) {
 }
 
 template <bool kUndersides, bool kTerrain>
-void draw(const WallSet& walls, const float eye[3], const Floors& floors,
-          std::span<const std::uint32_t> only, const PolarGuards& guards, std::uint64_t most,
-          PolarMap& map, PolarStats& stats) {
+void draw(const WallSet& walls, const float eye[3], const Floors& floors, const DrawLimits& limits,
+          const PolarGuards& guards, PolarMap& map, PolarStats& stats) {
   const View view = make_view(eye, map);
   WallPainter<kUndersides, kTerrain> painter(map, view, guards, stats);
   const auto paint = [&](std::uint32_t s) {
@@ -663,11 +662,16 @@ void draw(const WallSet& walls, const float eye[3], const Floors& floors,
     ++stats.solids_drawn;
   };
   // Drawing less is always safe.
-  const auto at_limit = [&] { return stats.draw_work() >= most && (stats.cut = true); };
-  if (!only.empty()) {
-    for (const std::uint32_t s : only) {
+  const auto at_limit = [&] { return stats.draw_work() >= limits.most && (stats.cut = true); };
+  const auto wanted = [&](std::uint32_t s) {
+    const bool yes = limits.wanted.empty() || limits.wanted[s] != 0;
+    stats.cut = stats.cut || !yes;
+    return yes;
+  };
+  if (!limits.only.empty()) {
+    for (const std::uint32_t s : limits.only) {
       if (at_limit()) return;
-      paint(s);
+      if (wanted(s)) paint(s);
     }
     return;
   }
@@ -690,7 +694,8 @@ void draw(const WallSet& walls, const float eye[3], const Floors& floors,
         hidden_in_all<kUndersides, kTerrain>(map, p.box, p.first, p.last, false))
       continue;
     if ((p.child & BoxTree::kItem) != 0) {
-      paint(p.child & ~BoxTree::kItem);
+      const std::uint32_t solid = p.child & ~BoxTree::kItem;
+      if (wanted(solid)) paint(solid);
       continue;
     }
     const BoxTree::Node& node = walls.tree.nodes[p.child];
@@ -739,26 +744,46 @@ void find_children(const BoxTree& tree, std::uint32_t root, const float eye[3], 
       [&](std::uint32_t i) { visible.push_back(i); }, [&](std::uint32_t n) { nodes.push_back(n); });
 }
 
+/// Level by level: what is left untested lies deep in the tree.
+template <bool kUndersides, bool kTerrain>
+void find_within(const BoxTree& tree, std::uint32_t root, const View& view, const PolarMap& map,
+                 std::uint64_t most, std::vector<std::uint32_t>& visible, PolarStats& stats) {
+  std::vector<std::uint32_t> queue{root};
+  Seen seen;
+  for (std::size_t i = 0; i < queue.size(); ++i) {
+    const BoxTree::Node& node = tree.nodes[queue[i]];
+    if (stats.nodes_tested < most) {
+      step<kUndersides, kTerrain>(
+          node, view, map, seen, stats, [&](std::uint32_t v) { visible.push_back(v); },
+          [&](std::uint32_t n) { queue.push_back(n); });
+      continue;
+    }
+    stats.cut = true;
+    for (std::uint32_t c = 0; c < node.count; ++c) {
+      if ((node.child[c] & BoxTree::kItem) != 0) {
+        visible.push_back(node.child[c] & ~BoxTree::kItem);
+        ++stats.untested;
+      } else {
+        queue.push_back(node.child[c]);
+      }
+    }
+  }
+}
+
 template <bool kUndersides, bool kTerrain>
 void find(const BoxTree& tree, std::uint32_t root, const float eye[3], const PolarMap& map,
           std::uint64_t most, std::vector<std::uint32_t>& visible, PolarStats& stats) {
   const View view = make_view(eye, map);
+  if (most != std::numeric_limits<std::uint64_t>::max()) {
+    find_within<kUndersides, kTerrain>(tree, root, view, map, most, visible, stats);
+    return;
+  }
   std::uint32_t stack[BoxTree::kWidth * 12];
   std::uint32_t size = 0;
   stack[size++] = root;
   Seen seen;
   while (size != 0) {
     const BoxTree::Node& node = tree.nodes[stack[--size]];
-    if (stats.nodes_tested >= most) {
-      stats.cut = true;
-      for (std::uint32_t c = 0; c < node.count; ++c) {
-        if ((node.child[c] & BoxTree::kItem) != 0)
-          visible.push_back(node.child[c] & ~BoxTree::kItem);
-        else
-          stack[size++] = node.child[c];
-      }
-      continue;
-    }
     step<kUndersides, kTerrain>(
         node, view, map, seen, stats, [&](std::uint32_t i) { visible.push_back(i); },
         [&](std::uint32_t n) { stack[size++] = n; });
@@ -773,10 +798,10 @@ void find_children_target(const BoxTree& tree, std::uint32_t root, const float* 
 }
 
 void draw_walls_target(const WallSet& walls, const float* eye, const Floors& floors,
-                       std::span<const std::uint32_t> only, const PolarGuards& guards,
-                       std::uint64_t most, PolarMap& map, PolarStats& stats) {
+                       const DrawLimits& limits, const PolarGuards& guards, PolarMap& map,
+                       PolarStats& stats) {
   choose(floors.undersides, map,
-         [&](auto u, auto t) { draw<u, t>(walls, eye, floors, only, guards, most, map, stats); });
+         [&](auto u, auto t) { draw<u, t>(walls, eye, floors, limits, guards, map, stats); });
 }
 
 void find_visible_target(const BoxTree& tree, std::uint32_t root, const float* eye, bool undersides,
@@ -853,9 +878,9 @@ void PolarMap::finish(bool undersides) {
 }
 
 void draw_walls(const WallSet& walls, const float eye[3], const Floors& floors,
-                std::span<const std::uint32_t> only, const PolarGuards& guards, std::uint64_t most,
-                PolarMap& map, PolarStats& stats) {
-  HWY_DYNAMIC_DISPATCH(draw_walls_target)(walls, eye, floors, only, guards, most, map, stats);
+                const DrawLimits& limits, const PolarGuards& guards, PolarMap& map,
+                PolarStats& stats) {
+  HWY_DYNAMIC_DISPATCH(draw_walls_target)(walls, eye, floors, limits, guards, map, stats);
 }
 
 void find_visible(const BoxTree& tree, std::uint32_t root, const float eye[3], bool undersides,

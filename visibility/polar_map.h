@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -113,7 +114,8 @@ struct PolarStats {
   std::uint64_t bins_written = 0;
   std::uint32_t nodes_searched = 0;  ///< of solids, while drawing
   std::uint32_t nodes_tested = 0;
-  bool cut = false;  ///< a limit was met
+  std::uint32_t untested = 0;  ///< items listed untested, as the limit was met
+  bool cut = false;            ///< something was left undrawn or untested
   std::uint64_t draw_work() const {
     return walls_drawn + bins_written / PolarMap::kBlock + std::uint64_t{2} * nodes_searched;
   }
@@ -130,15 +132,23 @@ struct PolarGuards {
       true;  ///< of tops lower than the eye, take the slope that holds over the bin
 };
 
+/// What of a WallSet is drawn; less is always safe.
+struct DrawLimits {
+  std::span<const std::uint32_t> only{};   ///< if not empty, just these solids, in this order
+  std::span<const std::uint8_t> wanted{};  ///< if not empty, a solid with 0 is passed over
+  /// Nothing is begun once PolarStats::draw_work() has reached it.
+  std::uint64_t most = std::numeric_limits<std::uint64_t>::max();
+};
+
 /// Draws the walls that can be seen past those already drawn, near ones first. `eye` is relative to
-/// the tree's origin and is the apex of the cell. `only`: if not empty, just these solids are
-/// drawn, in this order. `most`: nothing is begun once stats.draw_work() has reached it.
+/// the tree's origin and is the apex of the cell.
 void draw_walls(const WallSet& walls, const float eye[3], const Floors& floors,
-                std::span<const std::uint32_t> only, const PolarGuards& guards, std::uint64_t most,
-                PolarMap& map, PolarStats& stats);
+                const DrawLimits& limits, const PolarGuards& guards, PolarMap& map,
+                PolarStats& stats);
 
 /// Appends to `visible` the items of the tree below `root` that the map does not hide; any order.
-/// `most`: what is left once so many nodes have been tested is appended untested.
+/// `most`: what is left once so many nodes have been tested is appended untested; the nodes are
+/// then tested level by level, so that what is left is small.
 void find_visible(const BoxTree& tree, std::uint32_t root, const float eye[3], bool undersides,
                   const PolarMap& map, std::uint64_t most, std::vector<std::uint32_t>& visible,
                   PolarStats& stats);

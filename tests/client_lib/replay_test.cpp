@@ -65,7 +65,7 @@ TEST_F(Replay, AnotherMethodsAnswersAreToldApart) {
   const auto& d = r->differences.front();
   EXPECT_EQ(d.extra, 0U) << "it lists less";
   const auto size = [&](const Method& m) {
-    return m.solve({record.frames[d.frame].cell.eye, Reach::ball(0)})->objects.size();
+    return m.solve(record.frames[d.frame].cell)->objects.size();
   };
   EXPECT_EQ(d.missing, size(method) - size(other));
 }

@@ -1,5 +1,5 @@
 #pragma once
-// A visibility method that tests of the network can predict: objects whose centre is near the eye.
+// A visibility method that tests of the network can predict: objects whose centre is near the cell.
 
 #include <atomic>
 #include <cmath>
@@ -26,7 +26,8 @@ class NearMethod : public Method {
     const bool everything = cell.eye.y > 50;
     if (everything) pvs.everything_because = "above the world";
     for (ObjectId id = 0; id < scene_.object_count(); ++id)
-      if (everything || glm::distance(scene_.objects[id].bounds.centre(), cell.eye) <= radius_m_)
+      if (everything || glm::distance(scene_.objects[id].bounds.centre(), cell.eye) <=
+                            radius_m_ + cell.reach.half_extents().x)
         pvs.objects.push_back(id);
     return pvs;
   }

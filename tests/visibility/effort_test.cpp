@@ -48,7 +48,8 @@ TEST_F(EffortTest, NoBudgetAndNoStrategyEverMisses) {
           const auto units = [](double p, std::uint64_t of) {
             return static_cast<std::uint64_t>(p * static_cast<double>(of));
           };
-          const Effort effort{strategy, units(part, full.draw), units(test_part, full.test)};
+          const Effort effort{strategy, units(part, full.draw), units(test_part, full.test),
+                              full.draw};
           Work done;
           const auto pvs = map.solve({eye, reach}, effort, done);
           ASSERT_TRUE(pvs);
@@ -69,21 +70,56 @@ TEST_F(EffortTest, NoBudgetAndNoStrategyEverMisses) {
   }
 }
 
-TEST_F(EffortTest, DrawingGoesOverItsBudgetByLessThanOneOccluderAndNode) {
-  std::uint64_t largest = 0;
-  for (const Prism& prism : set.shrunk) {
-    std::uint64_t corners = 0;
-    for (const auto& ring : prism.footprint.rings)
-      corners += ring.size();
-    largest = std::max(largest, corners * (1 + 4 * CullMap::kBinsAFace / PolarMap::kBlock));
-  }
-  for (const Vec3& eye : eyes)
-    for (const Strategy strategy : {Strategy::kAbort, Strategy::kPredictive})
-      for (std::uint64_t budget = 0; budget < 400; budget += 7) {
-        Work done;
-        ASSERT_TRUE(map.solve({eye, reach}, Effort{strategy, budget, Effort::kUnbounded}, done));
-        EXPECT_LT(done.draw, budget + largest + 2) << budget;
+// Near first, so the work after each occluder is the same whatever the budget: a solve stops at the
+// first of these that reaches it.
+TEST_F(EffortTest, DrawingStopsAtTheFirstOccluderThatReachesTheBudget) {
+  for (const Vec3& eye : eyes) {
+    const auto drawn = [&](std::uint64_t budget) {
+      Work done;
+      EXPECT_TRUE(
+          map.solve({eye, reach}, Effort{Strategy::kAbort, budget, Effort::kUnbounded, 0}, done));
+      return done.draw;
+    };
+    Work full;
+    ASSERT_TRUE(map.solve({eye, reach}, Effort{}, full));
+    std::size_t stops = 0;
+    std::uint64_t at = 0;
+    while (at < full.draw) {
+      const std::uint64_t next = drawn(at + 1);
+      ASSERT_GT(next, at);
+      EXPECT_EQ(drawn(next), next);
+      if (next > at + 1) {
+        EXPECT_EQ(drawn(at + 2), next);
       }
+      at = next;
+      ++stops;
+    }
+    EXPECT_EQ(at, full.draw);
+    EXPECT_GT(stops, 10U);
+    EXPECT_EQ(drawn(0), 0U);
+  }
+}
+
+TEST_F(EffortTest, ChoosingIsCountedAndSaysWhatItLeftOut) {
+  for (const Vec3& eye : eyes) {
+    Work full;
+    ASSERT_TRUE(map.solve({eye, reach}, Effort{}, full));
+    Work done;
+    ASSERT_TRUE(map.solve(
+        {eye, reach}, Effort{Strategy::kPredictive, full.draw / 2, Effort::kUnbounded, full.draw},
+        done));
+    EXPECT_TRUE(done.cut);
+    EXPECT_GT(done.draw, 0U);
+    // All are chosen where a full drawing is paid for, or it is not known what that takes.
+    for (const Effort& effort :
+         {Effort{Strategy::kPredictive, 2 * full.draw, Effort::kUnbounded, full.draw},
+          Effort{Strategy::kPredictive, 2 * full.draw, Effort::kUnbounded, 0}}) {
+      const auto pvs = map.solve({eye, reach}, effort, done);
+      ASSERT_TRUE(pvs);
+      EXPECT_EQ(pvs->objects, map.solve({eye, reach})->objects);
+      EXPECT_FALSE(done.cut);
+    }
+  }
 }
 
 TEST_F(EffortTest, MoreWorkListsFewerObjectsInTheMean) {
@@ -93,7 +129,7 @@ TEST_F(EffortTest, MoreWorkListsFewerObjectsInTheMean) {
       std::size_t sum = 0;
       for (const Vec3& eye : eyes) {
         Work done;
-        sum += map.solve({eye, reach}, Effort{strategy, budget, Effort::kUnbounded}, done)
+        sum += map.solve({eye, reach}, Effort{strategy, budget, Effort::kUnbounded, 1000}, done)
                    ->objects.size();
       }
       listed.push_back(sum);
@@ -107,7 +143,7 @@ TEST_F(EffortTest, GuaranteedIsBoundedByTheSceneAndIgnoresBudgets) {
   const Work most = map.most_work();
   for (const Vec3& eye : eyes) {
     Work done;
-    const auto pvs = map.solve({eye, reach}, Effort{Strategy::kGuaranteed, 1, 1}, done);
+    const auto pvs = map.solve({eye, reach}, Effort{Strategy::kGuaranteed, 1, 1, 1}, done);
     ASSERT_TRUE(pvs);
     EXPECT_EQ(pvs->objects, map.solve({eye, reach})->objects);
     EXPECT_FALSE(done.cut);
@@ -124,7 +160,7 @@ TEST_F(EffortTest, TheOrthographicMapSaysThatItKeepsToNone) {
   EXPECT_FALSE(orthographic.keeps_to_effort());
   EXPECT_TRUE(map.keeps_to_effort());
   Work done;
-  const auto pvs = orthographic.solve({eyes[0], reach}, Effort{Strategy::kAbort, 0, 0}, done);
+  const auto pvs = orthographic.solve({eyes[0], reach}, Effort{Strategy::kAbort, 0, 0, 1}, done);
   ASSERT_TRUE(pvs);
   EXPECT_EQ(misses(*pvs), 0U);
 }

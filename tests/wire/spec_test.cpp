@@ -71,6 +71,7 @@ std::map<std::string, Message> example(Bytes& full, Bytes& difference) {
   m["pvs_full"] = PvsMessage{kSession, 1, 0, {}, false, 85, 1, 65535, full};
   m["pvs_difference"] = PvsMessage{kSession, 2, 1, Vec3(1, 2, 3), false, 90, 0, 32767, difference};
   m["pvs_everything"] = PvsMessage{kSession, 3, 0, {}, true, 4, 1, 65535, {}};
+  m["pace"] = PaceMessage{kSession, {60, 2, 0.015625}};
   m["refused"] = Refused{kSession, Refusal::kClosing, "bye"};
   m["bye"] = Bye{kSession};
   return m;

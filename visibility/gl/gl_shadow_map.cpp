@@ -30,9 +30,9 @@ struct Corner {
   std::uint32_t wall;
 };
 
-/// So that the corners stay within the 31 bits that a draw call counts in: a rectangle that three
-/// lines cut has at most seven, in five triangles.
-constexpr std::size_t kMostWalls = 1U << 24;
+/// At a time: 60 MB of corners, as a rectangle that three lines cut has at most seven of them, in
+/// five triangles.
+constexpr std::size_t kMostWalls = 1U << 18;
 
 /// Keeps the part of a convex polygon where dot(n, p) >= least.
 void clip(std::vector<Vec2>& polygon, const Vec2& n, double least) {
@@ -74,13 +74,14 @@ void add_polygon(const OrthographicMap::Grid& grid, const Vec2& eye, const Shado
 }  // namespace
 
 Result<std::unique_ptr<GlShadowMap>> GlShadowMap::create(std::unique_ptr<GlContext> context,
-                                                         const OrthographicMap& map) {
+                                                         const OrthographicMap& map,
+                                                         std::size_t most_walls) {
   std::unique_ptr<GlShadowMap> shadows(new GlShadowMap(std::move(context), map.grid()));
-  if (auto s = shadows->prepare(); !s) return s.error();
+  if (auto s = shadows->prepare(most_walls); !s) return s.error();
   return shadows;
 }
 
-Status GlShadowMap::prepare() {
+Status GlShadowMap::prepare(std::size_t most_walls) {
   const auto current = context_->make_current();
   if (!current) return current.error();
   if (grid_.columns == 0) return ok();
@@ -89,10 +90,10 @@ Status GlShadowMap::prepare() {
   if (blocks < 1)
     return unsupported("OpenGL: fragment shaders have no storage buffers (" + context_->renderer() +
                        ")");
-  GLint bytes = 0;
-  glGetIntegerv(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
-  most_walls_ =
-      std::min(static_cast<std::size_t>(std::max(bytes, 0)) / sizeof(ShadowWall), kMostWalls);
+  GLint64 bytes = 0;
+  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
+  most_walls_ = std::min(static_cast<std::size_t>(std::max<GLint64>(bytes, 0)) / sizeof(ShadowWall),
+                         most_walls > 0 ? most_walls : kMostWalls);
   const auto program = link_program(
       {{GL_VERTEX_SHADER, kShadowVertexShader}, {GL_FRAGMENT_SHADER, kShadowFragmentShader}},
       "shadows'");
@@ -137,8 +138,12 @@ Status GlShadowMap::draw(const std::vector<ShadowChain>& chains, const Vec3& eye
   glUniform2d(0, grid_.lo.x - eye.x, grid_.lo.y - eye.z);
   std::vector<ShadowWall> walls;
   std::vector<Corner> corners;
+  bool begun = false;
   const auto flush = [&] {
     if (walls.empty()) return;
+    // Some drivers overwrite a buffer that fragments yet to be drawn still read.
+    if (begun) glFinish();
+    begun = true;
     glNamedBufferData(corners_, static_cast<GLsizeiptr>(corners.size() * sizeof(Corner)),
                       corners.data(), GL_STREAM_DRAW);
     glNamedBufferData(walls_, static_cast<GLsizeiptr>(walls.size() * sizeof(ShadowWall)),

@@ -27,9 +27,11 @@ namespace ivis {
 ///            lie in the shadow whole, so that no polygon needs to be moved by half a pixel.
 class GlShadowMap : public ShadowDrawer {
  public:
-  /// Errors: kUnsupported: the context lacks something.
+  /// Errors: kUnsupported: the context lacks something. `most_walls`: drawn at a time; 0: as many
+  /// as the context lets shaders see. For tests.
   static Result<std::unique_ptr<GlShadowMap>> create(std::unique_ptr<GlContext> context,
-                                                     const OrthographicMap& map);
+                                                     const OrthographicMap& map,
+                                                     std::size_t most_walls = 0);
   Status draw(const std::vector<ShadowChain>& chains, const Vec3& eye,
               OrthographicMap::Heights& heights) const override;
 
@@ -39,10 +41,10 @@ class GlShadowMap : public ShadowDrawer {
  private:
   GlShadowMap(std::unique_ptr<GlContext> context, const OrthographicMap::Grid& grid)
       : grid_(grid), context_(std::move(context)) {}
-  Status prepare();
+  Status prepare(std::size_t most_walls);
 
   OrthographicMap::Grid grid_;
-  std::size_t most_walls_ = 0;  ///< that shaders see at a time
+  std::size_t most_walls_ = 0;  ///< that shaders see at a time; a longer chain hides nothing
   // Names in the context, which frees them when it goes.
   std::uint32_t program_ = 0, heights_ = 0, target_ = 0, walls_ = 0, corners_ = 0, array_ = 0;
   mutable std::mutex mutex_;

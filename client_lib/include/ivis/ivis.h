@@ -2,8 +2,8 @@
  *
  * A client connects to a visibility server, tells it once a frame where the eye is, and is told
  * which objects can be seen from anywhere the eye can get to before the next answer (the view cell:
- * the eye plus the session's reach). Nothing here waits for the network but ivis_client_connect()
- * and ivis_client_wait().
+ * a centre plus a reach, which come with each answer). Nothing here waits for the network but
+ * ivis_client_connect() and ivis_client_wait().
  *
  *     ivis_client_options options = ivis_client_options_default();
  *     ivis_client* client = NULL;
@@ -58,7 +58,7 @@ typedef enum ivis_status {
 typedef struct ivis_pace {
   double horizontal_m_s; /* in the ground plane; 0 to 1e6 */
   double vertical_m_s;
-  double frame_s; /* between frames; 0: not told */
+  double frame_s; /* between frames; 0: not told. Told to the server, decides nothing yet */
 } ivis_pace;
 
 /* What a client does when the eye is outside the cell of the PVS it has. */
@@ -88,11 +88,12 @@ typedef struct ivis_client_options {
   uint8_t predict;        /* 1: centre cells where the observer is going, by its last two poses */
   ivis_strategy strategy; /* a wish: a method without budgets does all there is */
   uint32_t budget_us;     /* of one solve; 0: the server's */
-  uint32_t linger_frames; /* objects are drawn for so many frames after they left the set */
+  uint32_t linger_frames; /* objects are drawn for so many frames, at most 3600, after they left
+                              the set */
 } ivis_client_options;
 
-/* tcp://127.0.0.1:7447, any scene, the server's reach, EVERYTHING, 5000 ms, 2000 ms, no pace, no
- * prediction, the server's strategy, no lingering. */
+/* tcp://127.0.0.1:7447, any scene, the server's largest reach, EVERYTHING, 5000 ms, 2000 ms, no
+ * pace, no prediction, the server's strategy, no lingering. */
 IVIS_API ivis_client_options ivis_client_options_default(void);
 
 /* Connects and waits until the server has said what it serves.
@@ -115,7 +116,8 @@ typedef enum ivis_cause {
   IVIS_CAUSE_SPEED = 3,        /* the eye moved faster than the pace told */
   IVIS_CAUSE_LADDER = 4,       /* the server has no cell as large as the pace needs */
   IVIS_CAUSE_LATE = 5,         /* the next PVS is later than those before it were */
-  IVIS_CAUSE_OTHER = 6         /* no pace was told, or it has not been measured yet */
+  IVIS_CAUSE_OTHER = 6 /* no pace was told, nothing is measured yet, or a cell was centred by
+                          prediction where the eye did not go */
 } ivis_cause;
 #define IVIS_CAUSES 7
 
@@ -135,7 +137,7 @@ typedef struct ivis_frame {
   double pvs_age_s;       /* since the pose of that PVS was sent; 0 without one */
   double margin_m;        /* from the eye to the cell's border, along the ground for upright
                              cells; 0 outside and without one */
-  double safe;            /* the part of the pace at which no stall is to be expected, 0 to 1 */
+  double safe;            /* the part of the pace that cells hold, 0 to 1; 1 while not known */
   const uint64_t* visible_bits; /* bit (id & 63) of word (id >> 6); valid until the next call with
                                    this client, NULL while object_count is 0 */
 } ivis_frame;
@@ -174,7 +176,7 @@ typedef struct ivis_stats {
   double held_m;                /* by how far eyes were held back, summed over frames */
   double latency_ms;            /* L: from a pose to its PVS being used, a high quantile */
   double interval_ms;           /* T: between poses whose PVS were used, likewise */
-  double hold_ms; /* for how long past its pose a PVS is used, likewise: L + T - frame */
+  double hold_ms;               /* for how long past its pose a PVS is used, likewise */
 } ivis_stats;
 IVIS_API void ivis_client_stats(const ivis_client* client, ivis_stats* out);
 
