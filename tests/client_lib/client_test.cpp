@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <cstdio>
+#include <functional>
+#include <optional>
 #include <set>
 #include <thread>
 #include <vector>
@@ -283,6 +285,99 @@ TEST(Client, BadArgumentsAreNamed) {
   EXPECT_NE(error_of([](auto& o) { o.policy = static_cast<ivis_policy>(3); }), "");
   EXPECT_EQ(ivis_client_connect(nullptr, nullptr, nullptr, 0), IVIS_ERROR_ARGUMENT);
   ivis_client_close(nullptr);
+}
+
+/// The set is the one of the cell that the frame names: NearMethod's depends on the reach.
+void expect_set_of_its_cell(const PvsView& view, const Method& method) {
+  const ivis_frame& f = view.raw();
+  if (f.sequence == 0 || view.everything()) return;
+  const auto reach = Reach::parse(f.cell_reach);
+  ASSERT_TRUE(reach);
+  const auto pvs = method.solve({{f.cell_eye[0], f.cell_eye[1], f.cell_eye[2]}, *reach});
+  ASSERT_TRUE(pvs);
+  EXPECT_EQ(ids(view), std::set<std::uint32_t>(pvs->objects.begin(), pvs->objects.end()))
+      << f.cell_reach;
+}
+
+TEST_F(ClientOverTcp, AfterARestartCellsAreOfTheNewServersLadder) {
+  const std::string address =
+      "ipc://" + ::testing::TempDir() + "ivis_ladders_" + std::to_string(getpid()) + ".sock";
+  const auto ladder = [&](std::vector<double> radii) {
+    std::vector<Reach> reaches;
+    for (const double r : radii)
+      reaches.push_back(Reach::cylinder(r, 0.1));
+    auto made = std::make_unique<server::Ladder>(reaches, method, 0.001);
+    for (std::uint32_t i = 0; i + 1 < reaches.size(); ++i)
+      made->add(i, method);
+    return made;
+  };
+  ivis_client_options options = ivis_client_options_default();
+  options.endpoint = address.c_str();
+  options.connect_timeout_ms = kWait;
+  options.silence_timeout_ms = 200;
+  options.pace = {1, 0, 0.01};
+  std::optional<RunningServer> server;
+  server.emplace(scene, ladder({0.5, 1, 3}), address);
+  auto client = VisibilityClient::connect(options);
+  ASSERT_TRUE(client) << client.error();
+  std::set<std::string> reaches;
+  double x = 2;
+  const auto walk = [&](int poses) {
+    for (int i = 0; i < poses; ++i) {
+      x += 0.001;
+      const double eye[3]{x, 1, 10};
+      static_cast<void>(client.pose(eye));
+      ASSERT_EQ(client.wait(kWait), IVIS_OK) << client.error();
+      const PvsView view = client.view(eye);
+      expect_set_of_its_cell(view, method);
+      reaches.insert(view.raw().cell_reach);
+    }
+  };
+  walk(60);
+  EXPECT_EQ(reaches, (std::set<std::string>{"cylinder:0.5,0.1", "cylinder:3,0.1"}))
+      << "the largest until the time is known, then the smallest";
+  server.reset();
+  server.emplace(scene, ladder({2, 3.5}), address);
+  reaches.clear();
+  walk(60);
+  EXPECT_EQ(reaches, (std::set<std::string>{"cylinder:2,0.1"}));
+  EXPECT_EQ(client.stats().reconnects, 1U);
+}
+
+TEST(ClientOptions, OfRealTimeAreChecked) {
+  const auto error_of = [](const std::function<void(ivis_client_options&)>& change) {
+    ivis_client_options options = ivis_client_options_default();
+    options.connect_timeout_ms = 0;
+    options.endpoint = "tcp://127.0.0.1:1";
+    change(options);
+    const auto client = VisibilityClient::connect(options);
+    return client ? std::string("no error") : client.error();
+  };
+  EXPECT_EQ(error_of([](auto&) {}), "no error");
+  EXPECT_NE(error_of([](auto& o) { o.pace.horizontal_m_s = -1; }).find("pace"), std::string::npos);
+  EXPECT_NE(error_of([](auto& o) { o.pace.vertical_m_s = NAN; }).find("pace"), std::string::npos);
+  EXPECT_NE(error_of([](auto& o) { o.pace.frame_s = 1e9; }).find("pace"), std::string::npos);
+  EXPECT_NE(error_of([](auto& o) { o.linger_frames = 4000; }).find("at most 3600"),
+            std::string::npos);
+  ivis_client_options options = ivis_client_options_default();
+  options.connect_timeout_ms = 0;
+  options.endpoint = "tcp://127.0.0.1:1";
+  const auto client = VisibilityClient::connect(options);
+  ASSERT_TRUE(client);
+  EXPECT_EQ(ivis_client_set_policy(client.get(), IVIS_POLICY_STALL), IVIS_OK);
+  EXPECT_EQ(ivis_client_set_policy(client.get(), static_cast<ivis_policy>(3)), IVIS_ERROR_ARGUMENT);
+  EXPECT_EQ(ivis_client_set_policy(nullptr, IVIS_POLICY_STALL), IVIS_ERROR_ARGUMENT);
+  ivis_pace pace{1, 1, 0};
+  EXPECT_EQ(ivis_client_set_pace(client.get(), &pace), IVIS_OK);
+  pace.vertical_m_s = HUGE_VAL;
+  EXPECT_EQ(ivis_client_set_pace(client.get(), &pace), IVIS_ERROR_ARGUMENT);
+  EXPECT_EQ(ivis_client_set_pace(client.get(), nullptr), IVIS_ERROR_ARGUMENT);
+  ivis_frame frame;
+  const double eye[3]{};
+  EXPECT_EQ(ivis_client_view(nullptr, eye, &frame), IVIS_ERROR_ARGUMENT);
+  EXPECT_STREQ(frame.cell_reach, "");
+  for (int c = 0; c < IVIS_CAUSES; ++c)
+    EXPECT_STRNE(ivis_cause_name(static_cast<ivis_cause>(c)), "unknown");
 }
 
 }  // namespace

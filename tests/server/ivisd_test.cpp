@@ -115,6 +115,12 @@ TEST_F(Daemon, UsageErrorsExit2) {
   EXPECT_EQ(run({"--no-such-flag"}), 2);
   EXPECT_EQ(run({"--scene", scene.string(), "--reach", "disk:1"}), 2);
   EXPECT_THAT(output, HasSubstr("flag --reach"));
+  EXPECT_EQ(run({"--scene", scene.string(), "--ladder", "disc:1 disc:0.5"}), 2);
+  EXPECT_THAT(output, HasSubstr("ascending"));
+  EXPECT_EQ(run({"--scene", scene.string(), "--strategy", "hope"}), 2);
+  EXPECT_THAT(output, HasSubstr("expected guaranteed, abort or predictive"));
+  EXPECT_EQ(run({"--scene", scene.string(), "--budget-us", "0"}), 2);
+  EXPECT_THAT(output, HasSubstr("flag --budget-us"));
 }
 
 TEST_F(Daemon, BadInputExits3) {

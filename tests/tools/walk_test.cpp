@@ -76,6 +76,56 @@ TEST(ToolWalk, ASilentAddressIsAConnectionErrorAndRecordsNothing) {
   EXPECT_FALSE(std::filesystem::exists(record));
 }
 
+TEST(ToolWalk, InRealTimeWhatWasDrawnMissesNothingAndReplaysTheSame) {
+  const SmallTown town;
+  const std::string address = "ipc://" + (town.folder / "socket");
+  const auto daemon_with = [&](const std::string& reach) {
+    return std::vector<std::string>{IVIS_DAEMON, "--scene",  town.scene, "--reach",
+                                    reach,       "--listen", address};
+  };
+  const std::string record = town.folder / "record";
+  const std::vector<std::string> again{"replay", record, "--connect", address, "--json"};
+  {
+    Process daemon(daemon_with("cylinder:1.5,0.1"));
+    ASSERT_TRUE(daemon.says("event=ladder rungs=4")) << daemon.output();
+    for (const std::vector<std::string>& wish :
+         {std::vector<std::string>{},
+          {"--strategy", "abort", "--budget-ms", "0.02"},
+          {"--strategy", "predictive", "--budget-ms", "0.02"},
+          {"--policy", "show-all", "--predict", "--speed-limit", "3"}}) {
+      std::vector<std::string> words{"walk", "--connect", address, "--path",   town.path, "--fps",
+                                     "60",   "--seconds", "1.5",   "--record", record,    "--json"};
+      words.insert(words.end(), wish.begin(), wish.end());
+      const Ran ran = ivis(words);
+      ASSERT_EQ(ran.code, 0) << ran.errors << daemon.output();
+      const Json j = ran.json();
+      if (wish.empty() || wish[0] == "--strategy") {
+        EXPECT_EQ(j["uncovered_frames"], 0) << "the eye is held";
+      }
+      for (const char* key : {"t_vis_ms_p50", "t_vis_ms_p99", "reach_median", "held_m",
+                              "stall_causes", "pvs_age_ms_p99"})
+        EXPECT_TRUE(j.contains(key)) << key;
+      EXPECT_GT(j["frames"], 10);
+      EXPECT_LE(j["reach_median"], 1.5);
+      const Ran verified = ivis({"verify", town.scene, "--record", record, "--stride", "10"});
+      EXPECT_EQ(verified.code, 0) << verified.out << verified.errors;
+      std::vector<std::string> replayed = again;
+      if (!wish.empty() && wish[0] == "--strategy")
+        replayed.insert(replayed.end(), wish.begin(), wish.end());
+      const Ran same = ivis(replayed);
+      EXPECT_EQ(same.code, 0) << same.out << same.errors;
+      EXPECT_GT(same.json()["same"], 5);
+    }
+    daemon.signal(SIGTERM);
+    EXPECT_EQ(daemon.finish(), 0) << daemon.output();
+  }
+  Process other(daemon_with("cylinder:9,0.1"));
+  ASSERT_TRUE(other.says("listening")) << other.output();
+  const Ran compared = ivis(again);
+  EXPECT_EQ(compared.code, 1) << "cells of another ladder cannot be compared";
+  EXPECT_GT(compared.json()["other_cell"], 0);
+}
+
 TEST(ToolWalk, RefusesALargerReachThanTheServers) {
   const SmallTown town;
   const std::string address = "ipc://" + (town.folder / "socket");

@@ -103,6 +103,20 @@ TEST(ToolRefuses, UsageErrorsWithCodeTwo) {
                  2, "--radius");
   expect_refused({"walk", "--connect", "ipc://x", "--path", t.path, "--policy", "wait"}, 2, "wait");
   expect_refused({"walk", "--connect", "carrier-pigeon", "--path", t.path}, 2, "carrier-pigeon");
+  const std::vector<std::string> walk{"walk", "--connect", "ipc://x", "--path", t.path};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), walk.begin(), walk.end());
+    return more;
+  };
+  expect_refused(with({"--fps", "60", "--hz", "60"}), 2, "--hz");
+  expect_refused(with({"--fps", "0"}), 2, "--fps");
+  expect_refused(with({"--seconds", "5"}), 2, "--fps");
+  expect_refused(with({"--fps", "60", "--speed-limit", "nan"}), 2, "--speed-limit");
+  expect_refused(with({"--strategy", "hope"}), 2, "hope");
+  expect_refused(with({"--budget-ms", "0"}), 2, "--budget-ms");
+  expect_refused({"replay", t.path}, 2, "--connect");
+  expect_refused({"replay", "--connect", "ipc://x"}, 2, "record");
+  expect_refused({"generate", "city", "-o", t.folder / "f", "--speed", "0"}, 2, "--speed");
 }
 
 TEST(ToolRefuses, InputErrorsWithCodeThree) {
@@ -157,6 +171,7 @@ TEST(ToolRefuses, WhatNeedsNoSceneBeforeTheSceneIsLoaded) {
   }
   expect_refused({"verify", scene, "--path", nothing, "--reach", "disc:1"}, 3, nothing);
   expect_refused({"verify", scene, "--path", t.path, "--reach", "disk:1"}, 2, "disk:1");
+  expect_refused({"replay", nothing, "--connect", "ipc://x"}, 3, nothing);
   expect_refused({"verify", scene, "--record", nothing}, 3, nothing);
   expect_refused({"draw", scene, "--eye", eye, "--reach", "disc:1", "-o", out}, 3, out);
   expect_refused({"shrink", scene, "--reach", "disc:1", "-o", out}, 3, out);
