@@ -6,7 +6,7 @@
 
 namespace ivis {
 
-/// How a solve keeps to its time (Wonka, Wimmer, Sillion 2001, section 4.4). The set is complete
+/// How a solve keeps to its time (Wonka, Wimmer, Sillion 2001, section 4.5). The set is complete
 /// with each: what is not drawn hides nothing, and what is not tested is listed.
 enum class Strategy : std::uint8_t {
   kGuaranteed,  ///< draws and tests all there is, which is bounded by the scene (docs/real-time.md)
