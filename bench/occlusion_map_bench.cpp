@@ -10,11 +10,11 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "bench/common.h"
 #include "bench/yardstick.h"
 #include "core/path.h"
 #include "occluders/fast_erosion.h"
@@ -27,26 +27,9 @@
 namespace {
 
 using namespace ivis;
-
-double cpu_ms() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) * 1e3 + static_cast<double>(t.tv_nsec) * 1e-6;
-}
-
-double median(std::vector<double> v) {
-  std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
-  return v[v.size() / 2];
-}
-
-template <class T>
-T get(Result<T> r) {
-  if (!r) {
-    std::fprintf(stderr, "occlusion_map_bench: %s\n", r.error().message.c_str());
-    std::exit(3);
-  }
-  return std::move(*r);
-}
+using bench::cpu_ms;
+using bench::get;
+using bench::median;
 
 Mat4 turn() {
   return glm::rotate(Mat4{1}, 0.7, glm::normalize(Vec3{1, 2, 3}));

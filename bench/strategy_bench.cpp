@@ -9,12 +9,12 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <fstream>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "bench/common.h"
 #include "core/path.h"
 #include "occluders/fast_erosion.h"
 #include "occluders/shrink.h"
@@ -26,26 +26,13 @@
 namespace {
 
 using namespace ivis;
-
-double cpu_ms() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) * 1e3 + static_cast<double>(t.tv_nsec) * 1e-6;
-}
+using bench::cpu_ms;
+using bench::get;
 
 double quantile(std::vector<double> v, double q) {
   const auto i = static_cast<std::ptrdiff_t>(q * static_cast<double>(v.size() - 1));
   std::nth_element(v.begin(), v.begin() + i, v.end());
   return v[static_cast<std::size_t>(i)];
-}
-
-template <class T>
-T get(Result<T> r) {
-  if (!r) {
-    std::fprintf(stderr, "strategy_bench: %s\n", r.error().message.c_str());
-    std::exit(3);
-  }
-  return std::move(*r);
 }
 
 struct Row {

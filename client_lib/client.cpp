@@ -173,10 +173,7 @@ ivis_status ivis_client::meet(std::chrono::milliseconds timeout) {
 
 const IdBits& ivis_client::all_bits() {
   const std::uint32_t n = source_->catalogue() != nullptr ? source_->catalogue()->objects() : 0;
-  if (all_.size() != ivis::client::words_for(n)) {
-    all_.assign(ivis::client::words_for(n), ~std::uint64_t{0});
-    if (n % 64 != 0) all_.back() = (std::uint64_t{1} << (n % 64)) - 1;
-  }
+  if (all_.size() != ivis::client::words_for(n)) all_ = ivis::client::all_of(n);
   return all_;
 }
 

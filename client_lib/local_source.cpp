@@ -113,7 +113,7 @@ class LocalSource : public PvsSource {
                                      : static_cast<std::uint32_t>(pvs->objects.size());
     if (!answer.everything)
       for (const ObjectId id : pvs->objects)
-        answer.bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
+        set_bit(answer.bits, id);
     return pvs ? "" : pvs.error().message;
   }
 

@@ -250,7 +250,7 @@ struct NetworkSource::Impl {
       for (std::size_t w = 0; w < state->set.words.size(); ++w) {
         for (std::uint64_t left = state->set.words[w]; left != 0; left &= left - 1) {
           const ObjectId id = id_of[w * 64 + static_cast<std::size_t>(std::countr_zero(left))];
-          a.bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
+          set_bit(a.bits, id);
           ++a.count;
         }
       }

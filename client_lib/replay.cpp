@@ -101,12 +101,8 @@ Result<ReplayReport> replay(const std::string& endpoint, const client::Record& r
     }
     client::IdBits recorded(client::words_for(record.objects));
     for (const ObjectId id : sets.at(i).objects)
-      recorded[id >> 6U] |= std::uint64_t{1} << (id & 63U);
-    if (answer.everything) {
-      answer.bits.assign(recorded.size(), ~std::uint64_t{0});
-      if (record.objects % 64 != 0)
-        answer.bits.back() = (std::uint64_t{1} << (record.objects % 64)) - 1;
-    }
+      client::set_bit(recorded, id);
+    if (answer.everything) answer.bits = client::all_of(record.objects);
     const ReplayDifference d{i, count(recorded, answer.bits), count(answer.bits, recorded)};
     if (d.missing == 0 && d.extra == 0) {
       ++report.same;

@@ -19,6 +19,14 @@ using IdBits = std::vector<std::uint64_t>;
 inline std::size_t words_for(std::size_t objects) {
   return (objects + 63) / 64;
 }
+inline void set_bit(IdBits& bits, ObjectId id) {
+  bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
+}
+inline IdBits all_of(std::size_t objects) {
+  IdBits bits(words_for(objects), ~std::uint64_t{0});
+  if (objects % 64 != 0) bits.back() = (std::uint64_t{1} << (objects % 64)) - 1;
+  return bits;
+}
 
 /// What is served: the same for as long as a client lives, but for the reach.
 struct Catalogue {

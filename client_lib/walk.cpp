@@ -348,7 +348,8 @@ Result<WalkReport> walk(const std::string& endpoint, const std::vector<Pose>& pa
                             " ms, expected 0 to 1e6");
   if (options.fps > 0)
     if (auto s = check_times(path); !s) return s.error();
-  const Played played(path);
+  std::optional<Played> played;
+  if (options.fps > 0) played.emplace(path);
   ivis_client_options wanted = ivis_client_options_default();
   wanted.endpoint = endpoint.c_str();
   wanted.scene_hash = options.scene_hash;
@@ -360,11 +361,11 @@ Result<WalkReport> walk(const std::string& endpoint, const std::vector<Pose>& pa
     wanted.strategy =
         static_cast<ivis_strategy>(IVIS_STRATEGY_GUARANTEED + static_cast<int>(*options.strategy));
   wanted.budget_us = static_cast<std::uint32_t>(1e3 * options.budget_ms);
-  if (options.fps > 0) {
-    const double own = played.horizontal_m_s();
+  if (played) {
+    const double own = played->horizontal_m_s();
     wanted.pace.horizontal_m_s =
         options.speed_limit_m_s > 0 ? std::min(options.speed_limit_m_s, own) : own;
-    wanted.pace.vertical_m_s = played.vertical_m_s();
+    wanted.pace.vertical_m_s = played->vertical_m_s();
     wanted.pace.frame_s = 1 / options.fps;
   }
   ivis_client* raw = nullptr;
@@ -376,9 +377,8 @@ Result<WalkReport> walk(const std::string& endpoint, const std::vector<Pose>& pa
   if (!info) return connection_error("the server at " + endpoint + " has not said what it serves");
   Walker walker(std::move(client), *info, options);
   const Status walked =
-      options.fps > 0
-          ? walk_in_real_time(walker, endpoint, played, options, wanted.pace, context, on_frame)
-          : walk_rows(walker, endpoint, path, options, context, on_frame);
+      played ? walk_in_real_time(walker, endpoint, *played, options, wanted.pace, context, on_frame)
+             : walk_rows(walker, endpoint, path, options, context, on_frame);
   if (!walked) return walked.error();
   return walker.finish();
 }

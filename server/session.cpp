@@ -131,11 +131,9 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
 
 std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::PoseMessage& pose,
                                              Time now) {
-  const auto found = sessions_.find(std::string(peer));
-  if (found == sessions_.end() || found->second.id != pose.session)
-    return refuse(peer, pose.session, wire::Refusal::kSession,
-                  "no such session here: say Hello again");
-  Session& session = found->second;
+  Session* const found = find(peer, pose.session);
+  if (found == nullptr) return refuse_unknown(peer, pose.session);
+  Session& session = *found;
   session.heard = now;
   if (!finite(pose.eye) || pose.sequence == 0) {
     ++counters_.malformed;
@@ -154,19 +152,25 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
 
 std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::PaceMessage& pace,
                                              Time now) {
-  const auto found = sessions_.find(std::string(peer));
-  if (found == sessions_.end() || found->second.id != pace.session)
-    return refuse(peer, pace.session, wire::Refusal::kSession,
-                  "no such session here: say Hello again");
-  found->second.heard = now;
-  found->second.pace = pace.pace;
+  Session* const session = find(peer, pace.session);
+  if (session == nullptr) return refuse_unknown(peer, pace.session);
+  session->heard = now;
+  session->pace = pace.pace;
   return std::nullopt;
 }
 
 std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::Bye& bye) {
-  const auto found = sessions_.find(std::string(peer));
-  if (found != sessions_.end() && found->second.id == bye.session) forget(peer);
+  if (find(peer, bye.session) != nullptr) forget(peer);
   return std::nullopt;
+}
+
+SessionTable::Session* SessionTable::find(std::string_view peer, std::uint64_t id) {
+  const auto found = sessions_.find(std::string(peer));
+  return found != sessions_.end() && found->second.id == id ? &found->second : nullptr;
+}
+
+Outgoing SessionTable::refuse_unknown(std::string_view peer, std::uint64_t session) {
+  return refuse(peer, session, wire::Refusal::kSession, "no such session here: say Hello again");
 }
 
 Outgoing SessionTable::refuse(std::string_view peer, std::uint64_t session, wire::Refusal reason,

@@ -127,6 +127,9 @@ class SessionTable {
   std::optional<Outgoing> handle(std::string_view peer, const wire::PoseMessage& pose, Time now);
   std::optional<Outgoing> handle(std::string_view peer, const wire::PaceMessage& pace, Time now);
   std::optional<Outgoing> handle(std::string_view peer, const wire::Bye& bye);
+  /// The peer's session if it is the one named, else null.
+  Session* find(std::string_view peer, std::uint64_t id);
+  Outgoing refuse_unknown(std::string_view peer, std::uint64_t session);
   Outgoing refuse(std::string_view peer, std::uint64_t session, wire::Refusal reason,
                   std::string text);
   std::vector<std::byte> welcome(Session& session);

@@ -84,7 +84,7 @@ class SimulatedSource : public client::PvsSource {
     if (a.everything) return a;
     a.bits.assign(client::words_for(catalogue_.objects()), 0);
     for (const ObjectId id : pvs->objects)
-      a.bits[id >> 6U] |= std::uint64_t{1} << (id & 63U);
+      client::set_bit(a.bits, id);
     a.count = static_cast<std::uint32_t>(pvs->objects.size());
     return a;
   }
