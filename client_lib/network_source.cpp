@@ -4,6 +4,8 @@
 #include <array>
 #include <bit>
 #include <cerrno>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <utility>
@@ -25,14 +27,24 @@ constexpr auto kSendAgain = std::chrono::milliseconds(2);
 constexpr auto kTimers = std::chrono::milliseconds(50);
 constexpr std::size_t kRememberedEyes = 1024;
 
+/// One a process, for as long as somebody uses it: it owns a thread that moves bytes.
+std::shared_ptr<zmq::context_t> shared_context() {
+  static std::mutex mutex;
+  static std::weak_ptr<zmq::context_t> shared;
+  const std::lock_guard lock(mutex);
+  auto context = shared.lock();
+  if (!context) shared = context = std::make_shared<zmq::context_t>(1);
+  return context;
+}
+
 }  // namespace
 
 struct NetworkSource::Impl {
   explicit Impl(const NetworkOptions& o)
       : options(o),
         scene_hash(o.scene_hash),
-        context(1),
-        socket(context, zmq::socket_type::dealer) {
+        context(shared_context()),
+        socket(*context, zmq::socket_type::dealer) {
     socket.set(zmq::sockopt::linger, 100);  // ms, for Bye
     // Not ZMQ_IMMEDIATE: it would drop a farewell that is followed at once by the disconnect. So a
     // few messages may wait for a server that is not there; it answers only the latest.
@@ -287,7 +299,7 @@ struct NetworkSource::Impl {
   std::optional<Error> failed;
   std::string last_trouble = "connecting";
   SourceStats counted;
-  zmq::context_t context;
+  std::shared_ptr<zmq::context_t> context;
   zmq::socket_t socket;
 };
 

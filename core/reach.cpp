@@ -103,7 +103,7 @@ double Reach::support(const Vec3& d) const {
       return glm::length(d * e_);
     case Kind::kDisc:
     case Kind::kCylinder:
-      return e_.x * std::hypot(d.x, d.z) + e_.y * std::abs(d.y);
+      return e_.x * std::sqrt(d.x * d.x + d.z * d.z) + e_.y * std::abs(d.y);
     case Kind::kBox:
       return glm::dot(glm::abs(d), e_);
   }

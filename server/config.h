@@ -28,6 +28,7 @@ struct Config {
   unsigned budget_us = 1000;                  ///< SessionLimits::budget_ms
   std::string method;                         ///< empty: the first of method_list()
   unsigned threads = 1;                       ///< inside one solve
+  unsigned workers = 0;                       ///< solves at a time; 0: one a core
   LogLevel log_level = LogLevel::kInfo;
   bool json_logs = false;
   bool busy_poll = false;

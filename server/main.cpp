@@ -200,6 +200,8 @@ int serve(const Config& config) {
   ServerOptions options;
   options.listen = config.listen;
   options.busy_poll = config.busy_poll;
+  options.workers =
+      config.workers > 0 ? config.workers : std::max(1U, std::thread::hardware_concurrency());
   options.limits.max_sessions = config.max_clients;
   options.limits.idle = std::chrono::seconds(config.idle_timeout_s);
   options.limits.least_solve = std::chrono::milliseconds(config.least_solve_ms);

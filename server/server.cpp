@@ -1,5 +1,6 @@
 #include "server/server.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <string_view>
 #include <utility>
@@ -8,14 +9,14 @@
 #include <zmq.hpp>
 
 #include "server/address.h"
+#include "server/workers.h"
 
 namespace ivis::server {
 namespace {
 
 // Nothing a client sends is long; ZeroMQ drops a peer that sends more.
 constexpr std::int64_t kMaxIncomingBytes = 64 << 10;
-// Poses wait here for at most one solve; answers of a client that does not read are dropped beyond
-// it.
+// Messages are taken in at once; answers of a client that does not read are dropped beyond it.
 constexpr int kReceiveQueue = 256;
 constexpr int kSendQueue = 16;
 constexpr int kMaxDrained = 4096;
@@ -47,6 +48,7 @@ struct Server::Impl {
       : options(o),
         log(l),
         sessions(scene, ladder, o.limits, cost),
+        workers(scene, std::max(1U, o.workers)),
         context(1),
         socket(context, zmq::socket_type::router) {}
 
@@ -113,15 +115,23 @@ struct Server::Impl {
   }
 
   void turn() {
-    const bool spin = sessions.work_waiting() || options.busy_poll;
-    zmq::pollitem_t item{socket.handle(), 0, ZMQ_POLLIN, 0};
-    if (!spin) zmq::poll(&item, 1, kLookAtStop);
+    const bool spin = options.busy_poll || (sessions.work_waiting() && workers.free());
+    zmq::pollitem_t items[] = {{socket.handle(), 0, ZMQ_POLLIN, 0},
+                               {nullptr, workers.fd(), ZMQ_POLLIN, 0}};
+    if (!spin) zmq::poll(items, 2, kLookAtStop);
     drain();
-    const auto welcomed = sessions.counters().welcomed;
-    if (const auto out = sessions.work()) {
-      send(*out);
-      if (sessions.counters().welcomed != welcomed)
+    for (JobDone& done : workers.take())
+      if (const auto out = sessions.finish(std::move(done))) send(*out);
+    while (workers.free()) {
+      SessionTable::Next next = sessions.next(std::chrono::steady_clock::now());
+      if (auto* job = std::get_if<Job>(&next)) {
+        workers.give(std::move(*job));
+      } else if (const auto* out = std::get_if<Outgoing>(&next)) {
+        send(*out);
         log.info("client_welcome", {{"clients", sessions.size()}, {"bytes", out->bytes.size()}});
+      } else {
+        break;
+      }
     }
     const auto now = std::chrono::steady_clock::now();
     if (now >= next_housekeeping) {
@@ -134,6 +144,7 @@ struct Server::Impl {
   ServerOptions options;
   Log& log;
   SessionTable sessions;
+  Workers workers;
   std::string endpoint;
   bool held = false;  ///< the address is ours
   std::uint64_t dropped = 0;

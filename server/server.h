@@ -14,15 +14,17 @@ struct ServerOptions {
   std::string listen =
       "tcp://127.0.0.1:7447";  ///< tcp://HOST:PORT (port * : any free one) or ipc://PATH
   bool busy_poll = false;      ///< spin instead of sleeping: a core for some tens of microseconds
+  unsigned workers = 1;        ///< threads that solve
   SessionLimits limits;
 };
 
 /// Could a server be bound there now? Errors: those of Server::bind. Leaves nothing behind.
 Status probe_address(const std::string& listen);
 
-/// The socket around a SessionTable: one thread that takes in everything that waits, then answers
-/// one client, and so on; it never blocks on a client. Threads:   bind() and run() from one thread;
-/// `stop` may be set from any, and from a signal handler. Ownership: borrows scene, ladder and log.
+/// The socket around a SessionTable: one thread that takes in everything that waits, hands jobs to
+/// the workers and sends what they bring back; it never blocks on a client, nor on a solve.
+/// Threads: bind() and run() from one thread; `stop` may be set from any, and from a signal
+/// handler. Ownership: borrows scene, ladder and log.
 class Server {
  public:
   /// Errors: kConnection when the address is taken by a live server or cannot be had;

@@ -2,18 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
-#include <thread>
 #include <utility>
 
-#define XXH_INLINE_ALL
-#include <xxhash.h>
-
 #include "core/view_cell.h"
-#include "wire/object_table.h"
 
 namespace ivis::server {
 namespace {
+
+/// A PVS is taken to be in use at least for so long, lest a client that claims less be always
+/// first.
+constexpr auto kLeastHold = std::chrono::milliseconds(2);
+/// Answers that SessionTable::passed_over_ looks back on.
+constexpr double kLookBack = 256;
+
+SessionTable::Time::duration frame_of(const Pace& pace) {
+  return std::chrono::duration_cast<SessionTable::Time::duration>(
+      std::chrono::duration<double>(pace.frame_s));
+}
 
 bool finite(const Vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -39,33 +44,9 @@ std::string why_another(const ServedScene& scene, SceneHash hash) {
 
 }  // namespace
 
-ServedScene served_scene(const Scene& scene) {
-  ServedScene served;
-  served.hash = scene.hash;
-  served.whole_hash = scene.whole_hash;
-  wire::ObjectTable table;
-  table.id = rank_order(scene);
-  served.order_hash = XXH3_64bits(table.id.data(), table.id.size() * sizeof(ObjectId));
-  served.rank_of.resize(scene.object_count());
-  for (Rank r = 0; r < table.id.size(); ++r) {
-    const Object& o = scene.objects[table.id[r]];
-    table.node.push_back(o.node);
-    table.instance.push_back(o.instance);
-    if (!scene.wholes.empty()) table.cluster.push_back(o.cluster);
-    served.rank_of[table.id[r]] = r;
-  }
-  served.packed_table = wire::pack_table(table);
-  return served;
-}
-
 SessionTable::SessionTable(const ServedScene& scene, const Ladder& ladder, SessionLimits limits,
                            const CostModel& cost)
-    : scene_(scene),
-      ladder_(ladder),
-      limits_(limits),
-      cost_(cost),
-      ids_(seeded()),
-      nothing_(scene.objects()) {}
+    : scene_(scene), ladder_(ladder), limits_(limits), cost_(cost), ids_(seeded()) {}
 
 std::optional<Outgoing> SessionTable::receive(std::string_view peer,
                                               std::span<const std::byte> bytes, Time now) {
@@ -86,7 +67,6 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
                                              Time now) {
   const auto known = sessions_.find(std::string(peer));
   // A new Hello ends whatever session the peer had, answered well or not.
-  const bool queued = known != sessions_.end() && known->second.in_turn;
   const auto turn_away = [&](wire::Refusal reason, std::string text) {
     forget(peer);
     return refuse(peer, 0, reason, std::move(text));
@@ -121,19 +101,20 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
     session.id = ids_();
   while (session.id == 0);
   session.heard = now;
+  session.due = now;
   session.welcome_due = true;
   session.table_wanted = hello.want_table;
-  session.in_turn = queued;
-  Session& kept = sessions_[std::string(peer)] = std::move(session);
-  enqueue(peer, kept);
+  forget(peer);
+  enqueue(*sessions_.emplace(peer, std::move(session)).first);
   return std::nullopt;
 }
 
 std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::PoseMessage& pose,
                                              Time now) {
-  Session* const found = find(peer, pose.session);
-  if (found == nullptr) return refuse_unknown(peer, pose.session);
-  Session& session = *found;
+  const auto found = sessions_.find(std::string(peer));
+  if (found == sessions_.end() || found->second.id != pose.session)
+    return refuse_unknown(peer, pose.session);
+  Session& session = found->second;
   session.heard = now;
   if (!finite(pose.eye) || pose.sequence == 0) {
     ++counters_.malformed;
@@ -144,9 +125,13 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
   if (pose.sequence <= session.last_sequence) return std::nullopt;  // none is answered twice
   session.last_sequence = pose.sequence;
   ++counters_.poses;
-  if (session.pose) ++counters_.superseded;
+  if (session.pose) {
+    ++counters_.superseded;
+    ++session.passed_over;
+  }
   session.pose = pose;
-  enqueue(peer, session);
+  session.posed = now;
+  enqueue(*found);
   return std::nullopt;
 }
 
@@ -179,30 +164,60 @@ Outgoing SessionTable::refuse(std::string_view peer, std::uint64_t session, wire
   return {std::string(peer), wire::encode(wire::Refused{session, reason, std::move(text)})};
 }
 
-void SessionTable::enqueue(std::string_view peer, Session& session) {
-  if (session.in_turn) return;
-  session.in_turn = true;
-  turn_.emplace_back(peer);
+void SessionTable::enqueue(Peers::value_type& peer) {
+  if (peer.second.waiting || peer.second.under_way) return;
+  peer.second.waiting = true;
+  waiting_.push_back(&peer);
 }
 
-std::optional<Outgoing> SessionTable::work() {
-  while (!turn_.empty()) {
-    std::string peer = std::move(turn_.front());
-    turn_.pop_front();
-    const auto found = sessions_.find(peer);
-    if (found == sessions_.end()) continue;
-    Session& session = found->second;
-    session.in_turn = false;
-    if (session.welcome_due) {
-      std::vector<std::byte> bytes = welcome(session);
-      if (session.pose) enqueue(peer, session);
-      return Outgoing{std::move(peer), std::move(bytes)};
-    }
-    if (session.pose) {
-      std::vector<std::byte> bytes = answer(session);
-      return Outgoing{std::move(peer), std::move(bytes)};
-    }
-  }
+// The next pose comes a frame later; half a frame more is left for its answer. Nobody waits longer
+// than the crowd makes all wait, else who once had to would be made to for good.
+bool SessionTable::can_wait(const Session& session, Time now) const {
+  const auto frame = frame_of(session.pace);
+  return !session.welcome_due && frame.count() > 0 && session.due > now &&
+         session.due > session.posed + frame * 3 / 2 &&
+         session.passed_over < std::ceil(passed_over_);
+}
+
+bool SessionTable::before(const Session& a, const Session& b, Time now) const {
+  const bool a_waits = can_wait(a, now);
+  if (a_waits != can_wait(b, now)) return !a_waits;
+  return a_waits ? a.posed > b.posed : a.due < b.due;
+}
+
+SessionTable::Next SessionTable::next(Time now) {
+  if (waiting_.empty()) return {};
+  const auto first = std::ranges::min_element(
+      waiting_, [&](const auto* a, const auto* b) { return before(a->second, b->second, now); });
+  Peers::value_type& peer = **first;
+  Session& session = peer.second;
+  waiting_.erase(first);
+  session.waiting = false;
+  if (!session.welcome_due) return answer(peer);
+  std::vector<std::byte> bytes = welcome(session);
+  if (session.pose) enqueue(peer);
+  return Outgoing{peer.first, std::move(bytes)};
+}
+
+std::optional<Outgoing> SessionTable::finish(JobDone done) {
+  const auto found = sessions_.find(done.peer);
+  if (found == sessions_.end() || found->second.id != done.session) return std::nullopt;
+  Session& session = found->second;
+  session.under_way = false;
+  ++counters_.answers;
+  if (done.failed) ++counters_.solve_errors;
+  if (done.cut_short) ++counters_.cut_short;
+  if (done.full) ++counters_.full_sets;
+  counters_.bytes_out += done.bytes.size();
+  if (done.after) remember(session, done.sequence, std::move(done.after));
+  if (session.pose) enqueue(*found);
+  return Outgoing{std::move(done.peer), std::move(done.bytes)};
+}
+
+std::optional<Outgoing> SessionTable::work(Time now) {
+  Next step = next(now);
+  if (auto* out = std::get_if<Outgoing>(&step)) return std::move(*out);
+  if (auto* job = std::get_if<Job>(&step)) return finish(perform(std::move(*job), scene_));
   return std::nullopt;
 }
 
@@ -234,73 +249,50 @@ Ladder::Choice SessionTable::choose(const Session& session, std::uint32_t hold_u
   return ladder_.choose(session.pace, hold_us);
 }
 
-std::vector<std::byte> SessionTable::answer(Session& session) {
+Job SessionTable::answer(Peers::value_type& peer) {
+  Session& session = peer.second;
   const wire::PoseMessage pose = *session.pose;
   session.pose.reset();
-  ++counters_.answers;
+  session.under_way = true;
+  // The first frame that needs another PVS.
+  session.due = session.posed + frame_of(session.pace) +
+                std::max<Time::duration>(kLeastHold, std::chrono::microseconds(pose.hold_us));
+  passed_over_ += (session.passed_over - passed_over_) / kLookBack;
+  session.passed_over = 0;
 
   const Ladder::Choice choice = choose(session, pose.hold_us);
-  const Reach& reach = session.reach ? *session.reach : ladder_.reaches()[choice.rung];
-  Work done;
-  const auto start = std::chrono::steady_clock::now();
-  const auto pvs = [&]() -> Result<Pvs> {
-    try {
-      if (session.effort.strategy == Strategy::kGuaranteed)
-        return choice.method->solve({pose.eye, reach});
-      return choice.method->solve({pose.eye, reach}, session.effort, done);
-    } catch (const std::exception& e) {  // out of memory costs one answer, not the daemon
-      return unsupported(e.what());
-    }
-  }();
-  if (limits_.least_solve.count() > 0) std::this_thread::sleep_until(start + limits_.least_solve);
-  const auto took = std::chrono::steady_clock::now() - start;
-
-  wire::PvsMessage m;
-  m.session = session.id;
-  m.sequence = pose.sequence;
-  m.rung = static_cast<std::uint16_t>(choice.rung);
-  m.safe = static_cast<std::uint16_t>(choice.safe * wire::PvsMessage::kAllSafe);
   if (choice.safe < 1) ++counters_.beyond_ladder;
-  if (done.cut) ++counters_.cut_short;
-  m.solve_us = static_cast<std::uint32_t>(std::min<std::int64_t>(
-      std::chrono::duration_cast<std::chrono::microseconds>(took).count(), UINT32_MAX));
-  if (!pvs) ++counters_.solve_errors;
-  if (!pvs || !pvs->everything_because.empty()) {
-    // Errs towards visible: what could not be solved is answered with every object.
-    m.everything = true;
-  } else {
-    wire::RankSet set(scene_.objects());
-    for (const ObjectId id : pvs->objects)
-      set.set(scene_.rank_of[id]);
-    const auto base =
-        std::find_if(session.sent.begin(), session.sent.end(),
-                     [&](const Remembered& r) { return r.sequence == pose.have_pvs; });
-    const bool known = pose.have_pvs != 0 && base != session.sent.end();
-    if (known) {
-      // The client holds this one and will not name an older one again.
-      session.acknowledged = pose.have_pvs;
-      session.sent.erase(session.sent.begin(), base);
-      m.base = pose.have_pvs;
-    } else {
-      ++counters_.full_sets;
-    }
-    wire::PvsState after(scene_.objects());
-    m.payload = wire::encode_pvs(set, known ? session.sent.front().state : nothing_, after);
-    remember(session, pose.sequence, std::move(after));
+  Job job;
+  job.peer = peer.first;
+  job.cell = {pose.eye, session.reach ? *session.reach : ladder_.reaches()[choice.rung]};
+  job.method = choice.method;
+  job.effort = session.effort;
+  job.least_solve = limits_.least_solve;
+  job.message.session = session.id;
+  job.message.sequence = pose.sequence;
+  job.message.rung = static_cast<std::uint16_t>(choice.rung);
+  job.message.safe = static_cast<std::uint16_t>(choice.safe * wire::PvsMessage::kAllSafe);
+  const auto base = std::find_if(session.sent.begin(), session.sent.end(),
+                                 [&](const Remembered& r) { return r.sequence == pose.have_pvs; });
+  if (pose.have_pvs != 0 && base != session.sent.end()) {
+    // The client holds this one and will not name an older one again.
+    session.acknowledged = pose.have_pvs;
+    session.sent.erase(session.sent.begin(), base);
+    job.message.base = pose.have_pvs;
+    job.base = session.sent.front().state;
   }
-  std::vector<std::byte> bytes = wire::encode(m);
-  counters_.bytes_out += bytes.size();
-  return bytes;
+  return job;
 }
 
 std::size_t SessionTable::remembered_limit() const {
   // A state holds two sets (wire/pvs_codec.h) and the model.
-  const std::size_t each = sizeof(Remembered) + 2 * nothing_.set.words.size() * 8;
+  const std::size_t each = sizeof(Remembered) + std::size_t{2} * ((scene_.objects() + 63) / 64) * 8;
   return std::max<std::size_t>(2,
                                std::min(limits_.remembered_sets, limits_.remembered_bytes / each));
 }
 
-void SessionTable::remember(Session& session, std::uint32_t sequence, wire::PvsState state) {
+void SessionTable::remember(Session& session, std::uint32_t sequence,
+                            std::shared_ptr<const wire::PvsState> state) {
   if (session.sent.size() >= remembered_limit()) {
     // The acknowledged one stays: poses on their way name it.
     const bool keep_first = session.sent.front().sequence == session.acknowledged;
@@ -312,8 +304,7 @@ void SessionTable::remember(Session& session, std::uint32_t sequence, wire::PvsS
 void SessionTable::forget(std::string_view peer) {
   const auto found = sessions_.find(std::string(peer));
   if (found == sessions_.end()) return;
-  // A peer stands in turn_ only while it has a session: so turn_ is as bounded as sessions_.
-  if (found->second.in_turn) std::erase(turn_, found->first);
+  if (found->second.waiting) std::erase(waiting_, &*found);
   sessions_.erase(found);
 }
 
@@ -332,7 +323,7 @@ std::vector<Outgoing> SessionTable::close() {
   for (const auto& [peer, session] : sessions_)
     farewells.push_back(refuse(peer, session.id, wire::Refusal::kClosing, "the server is closing"));
   sessions_.clear();
-  turn_.clear();
+  waiting_.clear();
   return farewells;
 }
 

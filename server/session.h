@@ -5,37 +5,24 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <random>
 #include <span>
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "core/reach.h"
-#include "occluders/occluder_set.h"
-#include "scenes/scene.h"
 #include "server/cost_model.h"
+#include "server/job.h"
 #include "server/ladder.h"
-#include "visibility/method.h"
 #include "wire/messages.h"
-#include "wire/pvs_codec.h"
 
 namespace ivis::server {
-
-/// What clients are told of a scene, made once. Threads: a value.
-struct ServedScene {
-  SceneHash hash = 0;
-  std::uint64_t order_hash = 0;
-  std::vector<std::uint8_t>
-      packed_table;           ///< wire/object_table.h; goes into every Welcome as it is
-  std::vector<Rank> rank_of;  ///< by id
-  SceneHash whole_hash = 0;  ///< Scene::whole_hash: not `hash` when meshes were split into clusters
-  std::uint32_t objects() const { return static_cast<std::uint32_t>(rank_of.size()); }
-};
-
-ServedScene served_scene(const Scene& scene);
 
 struct SessionLimits {
   std::size_t max_sessions = 256;
@@ -69,13 +56,16 @@ struct Outgoing {
   std::vector<std::byte> bytes;
 };
 
-/// The sessions of one server: takes messages in with receive(), hands out work a client at a time
-/// with work(). A later pose of a client replaces its earlier one; clients with something to answer
-/// take turns. An answer is coded against the newest PVS the client has acknowledged, so that any
-/// message may be lost. The cell is the smallest of the ladder that holds the observer for as long
-/// as it says a PVS is in use (docs/theory.md, 6). Threads:   one thread at a time. Ownership:
-/// borrows scene and ladder. Limits:    max_sessions, and per session remembered_bytes of sets; a
-/// full table refuses with kBusy.
+/// The sessions of one server: takes messages in with receive(), hands out what is to be done with
+/// next(), takes back what came of it with finish(). A later pose of a client replaces its earlier
+/// one; one job of a client is under way at a time. Each client has a deadline, by when the PVS it
+/// has should be replaced; who cannot wait for his next pose comes first, by deadline, then who has
+/// said last where he is: his PVS will be the freshest. An answer is coded against the newest PVS
+/// the client has acknowledged, so that any message may be lost. The cell is the smallest of the
+/// ladder that holds the observer for as long as it says a PVS is in use (docs/theory.md, 6).
+/// Threads:   one thread at a time; jobs are done in any. Ownership: borrows scene and ladder.
+/// Limits:    max_sessions, and per session remembered_bytes of sets; a full table refuses with
+/// kBusy.
 class SessionTable {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -89,9 +79,15 @@ class SessionTable {
   std::optional<Outgoing> receive(std::string_view peer, std::span<const std::byte> bytes,
                                   Time now);
 
-  bool work_waiting() const { return !turn_.empty(); }
-  /// Answers the next client in turn. Cost: one solve and one encoding.
-  std::optional<Outgoing> work();
+  /// Is there something for next()?
+  bool work_waiting() const { return !waiting_.empty(); }
+  /// A message to send, or a job to perform() and bring back to finish(); monostate: nothing waits.
+  using Next = std::variant<std::monostate, Outgoing, Job>;
+  Next next(Time now);
+  /// The answer, unless its session has ended.
+  std::optional<Outgoing> finish(JobDone done);
+  /// next(), performed here and finished.
+  std::optional<Outgoing> work(Time now);
 
   /// The transport says that this peer is gone.
   void forget(std::string_view peer);
@@ -106,22 +102,29 @@ class SessionTable {
  private:
   struct Remembered {
     std::uint32_t sequence;
-    wire::PvsState state;
+    std::shared_ptr<const wire::PvsState> state;
   };
+
   struct Session {
     std::uint64_t id = 0;
     std::optional<Reach> reach;  ///< of every cell; none: the ladder's
     Pace pace;
     Effort effort;
     Time heard{};
+    Time due{};  ///< by when its PVS should be replaced
     bool welcome_due = false;
     bool table_wanted = false;
-    bool in_turn = false;
+    bool under_way = false;           ///< a job of it
+    bool waiting = false;             ///< is in waiting_
+    std::uint32_t passed_over = 0;    ///< poses since the last that was answered
     std::uint32_t last_sequence = 0;  ///< of poses received
     std::uint32_t acknowledged = 0;   ///< sequence of the PVS the client holds
     std::optional<wire::PoseMessage> pose;
+    Time posed{};                 ///< when that pose came
     std::deque<Remembered> sent;  ///< ascending sequence
   };
+
+  using Peers = std::unordered_map<std::string, Session>;
 
   std::optional<Outgoing> handle(std::string_view peer, const wire::Hello& hello, Time now);
   std::optional<Outgoing> handle(std::string_view peer, const wire::PoseMessage& pose, Time now);
@@ -133,10 +136,14 @@ class SessionTable {
   Outgoing refuse(std::string_view peer, std::uint64_t session, wire::Refusal reason,
                   std::string text);
   std::vector<std::byte> welcome(Session& session);
-  std::vector<std::byte> answer(Session& session);
+  Job answer(Peers::value_type& peer);
   Ladder::Choice choose(const Session& session, std::uint32_t hold_us) const;
-  void remember(Session& session, std::uint32_t sequence, wire::PvsState state);
-  void enqueue(std::string_view peer, Session& session);
+  void remember(Session& session, std::uint32_t sequence,
+                std::shared_ptr<const wire::PvsState> state);
+  /// May its latest pose be passed over for the next one, which is a frame later?
+  bool can_wait(const Session& session, Time now) const;
+  bool before(const Session& a, const Session& b, Time now) const;
+  void enqueue(Peers::value_type& peer);
   std::size_t remembered_limit() const;
 
   const ServedScene& scene_;
@@ -144,10 +151,10 @@ class SessionTable {
   SessionLimits limits_;
   CostModel cost_;
   SessionCounters counters_;
-  std::unordered_map<std::string, Session> sessions_;  ///< by peer
-  std::deque<std::string> turn_;                       ///< peers with something to answer
+  Peers sessions_;
+  std::vector<Peers::value_type*> waiting_;  ///< with something to be done, in any order
+  double passed_over_ = 0;                   ///< poses an answer, lately
   std::mt19937_64 ids_;
-  const wire::PvsState nothing_;
 };
 
 }  // namespace ivis::server

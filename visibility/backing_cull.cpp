@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
+#include <cstdint>
 #include <utility>
+#include <vector>
 
 #include "core/view_cell.h"
 #include "visibility/culled_method.h"
@@ -15,41 +16,75 @@ class BackingCull final : public CulledMethod {
  public:
   BackingCull(std::unique_ptr<Method> method, const Scene& scene, const OccluderSet& occluders)
       : CulledMethod(std::move(method)),
-        scene_(scene),
-        occluders_(occluders),
-        first_(scene.objects.size() + 1, 0) {
-    for (const Backing& b : occluders.backings)
-      ++first_[b.object + 1];
-    for (std::size_t i = 1; i < first_.size(); ++i)
-      first_[i] += first_[i - 1];
+        slack_m_(occluders.slack_m),
+        record_(scene.objects.size(), 0),
+        backed_(1) {
+    for (const Backing& b : occluders.backings) {
+      if (scene.objects[b.object].always_visible) continue;
+      std::uint32_t& record = record_[b.object];
+      if (record == 0) {
+        record = static_cast<std::uint32_t>(backed_.size());
+        backed_.push_back({b, scene.objects[b.object].bounds, 0, 0});
+        continue;
+      }
+      Backed& object = backed_[record];  // its planes follow each other
+      if (object.more++ == 0) object.first = static_cast<std::uint32_t>(others_.size());
+      others_.push_back(b);
+    }
   }
 
  private:
   void cull(const ViewCell& cell, std::vector<ObjectId>& objects) const override {
-    const Reach reach = padded(cell.reach, occluders_.slack_m);
+    const Reach reach = padded(cell.reach, slack_m_);
     const Vec3 move = reach.half_extents();
-    std::erase_if(objects, [&](ObjectId id) {
-      const std::span<const Backing> planes(occluders_.backings.data() + first_[id],
-                                            first_[id + 1] - first_[id]);
-      if (planes.empty() || scene_.objects[id].always_visible) return false;
-      const Aabb& box = scene_.objects[id].bounds;
-      // No point of the object is farther from any viewpoint of the cell, in any axis.
-      const Vec3 far = glm::max(glm::abs(box.lo - cell.eye), glm::abs(box.hi - cell.eye)) + move;
-      const double level = std::sqrt(far.x * far.x + far.z * far.z);
-      return std::ranges::all_of(planes, [&](const Backing& b) {
-        const double behind =
-            b.plane.offset - glm::dot(b.plane.normal, cell.eye) - reach.support(b.plane.normal);
-        if (!(behind > 0)) return false;
-        if (b.plane.normal.y != 0)
-          return behind >= std::max(b.per_level, b.per_height) * glm::length(far);
-        return behind >= b.per_level * level && behind >= b.per_height * far.y;
-      });
-    });
+    constexpr std::size_t kAhead = 12;  // memory takes longer than the arithmetic
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+      if (i + kAhead < objects.size()) {
+        const char* next = reinterpret_cast<const char*>(&backed_[record_[objects[i + kAhead]]]);
+        __builtin_prefetch(next);
+        __builtin_prefetch(next + 64);
+      }
+      const std::uint32_t record = record_[objects[i]];
+      if (record == 0 || !hidden(backed_[record], cell.eye, reach, move))
+        objects[kept++] = objects[i];
+    }
+    objects.resize(kept);
   }
 
-  const Scene& scene_;
-  const OccluderSet& occluders_;
-  std::vector<std::size_t> first_;  ///< backings of object i: [first_[i], first_[i + 1])
+  struct Backed {
+    Backing plane;
+    Aabb box;
+    std::uint32_t first = 0;  ///< of further planes, in others_
+    std::uint32_t more = 0;
+  };
+
+  bool hidden(const Backed& object, const Vec3& eye, const Reach& reach, const Vec3& move) const {
+    if (!(behind(object.plane, eye, reach) > 0)) return false;
+    // No point of the object is farther from any viewpoint of the cell, in any axis.
+    const Aabb& box = object.box;
+    const Vec3 far = glm::max(glm::abs(box.lo - eye), glm::abs(box.hi - eye)) + move;
+    if (!hides(object.plane, eye, reach, far)) return false;
+    for (std::uint32_t k = 0; k < object.more; ++k)
+      if (!hides(others_[object.first + k], eye, reach, far)) return false;
+    return true;
+  }
+  static double behind(const Backing& b, const Vec3& eye, const Reach& reach) {
+    return b.plane.offset - glm::dot(b.plane.normal, eye) - reach.support(b.plane.normal);
+  }
+  static bool hides(const Backing& b, const Vec3& eye, const Reach& reach, const Vec3& far) {
+    const double depth = behind(b, eye, reach);
+    if (!(depth > 0)) return false;
+    if (b.plane.normal.y != 0)
+      return depth >= std::max(b.per_level, b.per_height) * glm::length(far);
+    return depth >= b.per_level * std::sqrt(far.x * far.x + far.z * far.z) &&
+           depth >= b.per_height * far.y;
+  }
+
+  double slack_m_;
+  std::vector<std::uint32_t> record_;  ///< by id, in backed_; 0: nothing is behind it
+  std::vector<Backed> backed_;
+  std::vector<Backing> others_;
 };
 
 }  // namespace

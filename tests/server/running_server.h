@@ -20,13 +20,15 @@ class RunningServer {
       : RunningServer(scene, std::make_unique<server::Ladder>(reach, method, OccluderSet{}.slack_m),
                       listen, limits) {}
   RunningServer(const Scene& scene, std::unique_ptr<server::Ladder> ladder,
-                const std::string& listen = "tcp://127.0.0.1:*", server::SessionLimits limits = {})
+                const std::string& listen = "tcp://127.0.0.1:*", server::SessionLimits limits = {},
+                unsigned workers = 1)
       : served_(server::served_scene(scene)),
         ladder_(std::move(ladder)),
         log_(server::LogLevel::kOff, false) {
     server::ServerOptions options;
     options.listen = listen;
     options.limits = limits;
+    options.workers = workers;
     auto bound = server::Server::bind(options, served_, *ladder_, log_);
     if (!bound) {
       ADD_FAILURE() << bound.error().message;

@@ -2,9 +2,12 @@
 
 #include "server/server.h"
 
+#include <condition_variable>
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <random>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -115,6 +118,64 @@ TEST_F(ServerSocket, AClientThatNeverReadsDoesNotHoldUpAnother) {
       ASSERT_TRUE(good.answered(session, s));
     }
   }
+}
+
+/// Solves for nobody before so many are being solved for at a time.
+class TogetherMethod : public NearMethod {
+ public:
+  TogetherMethod(const Scene& scene, int together) : NearMethod(scene), wanted_(together) {}
+  using NearMethod::solve;
+  Result<Pvs> solve(const ViewCell& cell) const override {
+    std::unique_lock lock(mutex_);
+    ++inside_;
+    changed_.notify_all();
+    const bool met =
+        changed_.wait_for(lock, std::chrono::seconds(10), [this] { return inside_ >= wanted_; });
+    lock.unlock();
+    return met ? NearMethod::solve(cell) : Result<Pvs>(invalid_argument("alone"));
+  }
+
+ private:
+  int wanted_;
+  mutable int inside_ = 0;
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+};
+
+TEST(Workers, SolveForSeveralClientsAtATime) {
+  const Scene scene = grid_scene(6);
+  const TogetherMethod method(scene, 3);
+  RunningServer server(scene,
+                       std::make_unique<server::Ladder>(Reach::cylinder(1.5, 0.1), method, 0.001),
+                       "tcp://127.0.0.1:*", {}, 3);
+  std::vector<std::unique_ptr<RawPeer>> peers;
+  for (int i = 0; i < 3; ++i) {
+    peers.push_back(std::make_unique<RawPeer>(server.endpoint()));
+    const std::uint64_t session = peers.back()->greet();
+    peers.back()->send(wire::PoseMessage{session, 1, 0, {4, 1, 4}});
+  }
+  for (auto& p : peers) {
+    const auto m = p->receive();
+    ASSERT_TRUE(m);
+    EXPECT_FALSE(std::get<wire::PvsMessage>(*m).everything) << "none was solved for alone";
+  }
+}
+
+TEST(Workers, AServerCanBeClosedWhileTheySolve) {
+  const Scene scene = grid_scene(6);
+  const NearMethod method(scene);
+  server::SessionLimits limits;
+  limits.least_solve = std::chrono::milliseconds(300);
+  RunningServer server(scene, method, Reach::cylinder(1.5, 0.1), "tcp://127.0.0.1:*", limits);
+  RawPeer peer(server.endpoint());
+  const std::uint64_t session = peer.greet();
+  peer.send(wire::PoseMessage{session, 1, 0, {4, 1, 4}});
+  while (method.solves == 0)
+    std::this_thread::yield();
+  server.stop();
+  const auto m = peer.receive();
+  ASSERT_TRUE(m);
+  EXPECT_TRUE(std::holds_alternative<wire::Refused>(*m)) << "farewell";
 }
 
 TEST_F(ServerSocket, BidsItsClientsFarewell) {

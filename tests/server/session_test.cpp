@@ -52,7 +52,7 @@ class Sessions : public ::testing::Test {
   Peer greet(const std::string& name) {
     Peer peer{name, 0, {}, {}};
     EXPECT_FALSE(say(peer, wire::Hello{}));
-    const auto out = table().work();
+    const auto out = table().work(now);
     EXPECT_TRUE(out);
     const auto welcome = std::get<wire::Welcome>(decoded(*out, name));
     peer.session = welcome.session;
@@ -65,7 +65,7 @@ class Sessions : public ::testing::Test {
   }
   /// The next message of the server, which must be a PVS for `peer`.
   wire::PvsMessage next_pvs(const Peer& peer) {
-    const auto out = table().work();
+    const auto out = table().work(now);
     EXPECT_TRUE(out);
     if (!out) return {};
     const auto m = decoded(*out, peer.name);
@@ -97,7 +97,7 @@ class Sessions : public ::testing::Test {
 TEST_F(Sessions, WelcomeNamesEveryObject) {
   Peer peer{"a", 0, {}, {}};
   say(peer, wire::Hello{});
-  const auto w = std::get<wire::Welcome>(decoded(*table().work(), "a"));
+  const auto w = std::get<wire::Welcome>(decoded(*table().work(now), "a"));
   EXPECT_EQ(w.scene_hash, scene.hash);
   EXPECT_EQ(w.objects, scene.object_count());
   EXPECT_EQ(w.reaches, std::vector<std::string>{"disc:2"});
@@ -116,11 +116,11 @@ TEST_F(Sessions, WelcomeCarriesTheTableThatWasPackedOnce) {
   }
   served.packed_table = wire::pack_table(other);
   say({"a", 0, {}, {}}, wire::Hello{});
-  EXPECT_EQ(std::get<wire::Welcome>(decoded(*table().work(), "a")).table, other);
+  EXPECT_EQ(std::get<wire::Welcome>(decoded(*table().work(now), "a")).table, other);
   wire::Hello hello;
   hello.want_table = false;
   say({"b", 0, {}, {}}, hello);
-  EXPECT_TRUE(std::get<wire::Welcome>(decoded(*table().work(), "b")).table.id.empty());
+  EXPECT_TRUE(std::get<wire::Welcome>(decoded(*table().work(now), "b")).table.id.empty());
 }
 
 TEST_F(Sessions, FirstAnswerIsFullAndLaterOnesDiffer) {
@@ -173,7 +173,7 @@ TEST_F(Sessions, LatestPoseWins) {
     pose(a, s, {1.0 * s, 1, 4});
   EXPECT_EQ(next_pvs(a).sequence, 10U);
   EXPECT_EQ(method.solves, solves + 1);
-  EXPECT_FALSE(table().work());
+  EXPECT_FALSE(table().work(now));
   EXPECT_EQ(table().counters().superseded, 9U);
 }
 
@@ -199,6 +199,108 @@ TEST_F(Sessions, ClientsTakeTurns) {
       pose(*p, 2 + s++, {4, 1, 4});  // asks again at once, and still waits for the others
     }
   }
+}
+
+/// Three renderers of 16 ms a frame whose PVS hold for long, as they do where there is a crowd.
+class Crowd : public Sessions {
+ protected:
+  Peer join(const std::string& name) {
+    Peer peer{name, 0, {}, {}};
+    wire::Hello hello;
+    hello.pace = {1, 0, 0.016};
+    say(peer, hello);
+    const auto w = std::get<wire::Welcome>(decoded(*table().work(now), name));
+    peer.session = w.session;
+    return peer;
+  }
+  void says(const Peer& peer, std::chrono::milliseconds at, std::uint32_t hold_ms = 200) {
+    now = SessionTable::Time(1s) + at;
+    sequence[peer.name] += 1;
+    say(peer, wire::PoseMessage{peer.session, sequence[peer.name], 0, {4, 1, 4}, hold_ms * 1000});
+  }
+  std::string answered() {
+    const auto out = table().work(now);
+    return out ? out->peer : "";
+  }
+  void passes_over(const Peer& a, const Peer& b, int times) {
+    for (int i = 0; i < times; ++i) {
+      says(a, std::chrono::milliseconds(16 * i));
+      says(b, std::chrono::milliseconds(16 * i + 1));
+      answered();
+    }
+  }
+  std::map<std::string, std::uint32_t> sequence;
+};
+
+TEST_F(Crowd, WhoCanWaitYieldsToAFresherPoseAndThenComesFirst) {
+  Peer a = join("a");
+  Peer b = join("b");
+  passes_over(a, b, 20);  // the server learns that there is too much to do
+  while (!answered().empty()) {
+  }
+  says(a, 400ms);
+  answered();
+  says(b, 401ms);
+  answered();
+  says(a, 416ms);
+  says(b, 417ms);
+  EXPECT_EQ(answered(), "b") << "the fresher pose";
+  says(b, 433ms);
+  says(a, 432ms);
+  EXPECT_EQ(answered(), "a") << "passed over once already, as often as the crowd makes one wait";
+  EXPECT_EQ(answered(), "b");
+}
+
+TEST_F(Crowd, WhoseSetRunsOutComesFirst) {
+  Peer a = join("a");
+  Peer b = join("b");
+  passes_over(a, b, 20);
+  while (!answered().empty()) {
+  }
+  says(a, 400ms, 10);  // needs the next one at 426 ms
+  answered();
+  says(b, 401ms);
+  answered();
+  says(a, 416ms, 10);
+  says(b, 417ms);
+  EXPECT_EQ(answered(), "a") << "its next pose would be too late";
+}
+
+TEST_F(Crowd, NobodyIsPassedOverForGood) {
+  std::vector<Peer> all;
+  for (const char* name : {"a", "b", "c", "d"})
+    all.push_back(join(name));
+  std::map<std::string, int> gap;
+  int longest = 0;
+  for (int frame = 0; frame < 400; ++frame) {
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      says(all[i], std::chrono::milliseconds(16 * frame + 4 * static_cast<int>(i)), 5000);
+      if (i % 2 == 0) continue;  // two answers for four poses
+      const std::string who = answered();
+      for (const Peer& p : all)
+        longest = std::max(longest, p.name == who ? (gap[p.name] = 0) : ++gap[p.name]);
+    }
+  }
+  EXPECT_GE(longest, 3);
+  EXPECT_LE(longest, 8) << "each is answered at least every fourth frame, two answers a frame";
+}
+
+TEST_F(Sessions, AnAnswerUnderWayIsLostWithItsSession) {
+  Peer a = greet("a");
+  pose(a, 1, {4, 1, 4});
+  auto step = table().next(now);
+  ASSERT_TRUE(std::holds_alternative<server::Job>(step));
+  pose(a, 2, {5, 1, 4});
+  EXPECT_FALSE(table().work_waiting()) << "one job of a client at a time";
+  auto done = server::perform(std::move(std::get<server::Job>(step)), served);
+  const auto again = server::JobDone(done);
+  ASSERT_TRUE(table().finish(std::move(done)));
+  EXPECT_TRUE(table().work_waiting());
+  say(a, wire::Hello{});
+  EXPECT_FALSE(table().finish(server::JobDone(again))) << "of the session before";
+  table().forget("a");
+  EXPECT_FALSE(table().finish(server::JobDone(again)));
+  EXPECT_FALSE(table().work_waiting());
 }
 
 TEST_F(Sessions, UnsolvablePoseIsAnsweredWithEverything) {
@@ -266,7 +368,7 @@ TEST_F(Sessions, ServesASmallerReachAndRefusesALargerOne) {
   wire::Hello hello;
   hello.reach = "disc:1";
   EXPECT_FALSE(say({"a", 0, {}, {}}, hello));
-  EXPECT_EQ(std::get<wire::Welcome>(decoded(*table().work(), "a")).reaches,
+  EXPECT_EQ(std::get<wire::Welcome>(decoded(*table().work(now), "a")).reaches,
             std::vector<std::string>{"disc:1"});
   hello.reach = "disc:2.1";
   EXPECT_EQ(reason(say({"a", 0, {}, {}}, hello)), Refusal::kReach);
@@ -304,7 +406,7 @@ class SessionsOnALadder : public Sessions {
   Peer greet_with(const wire::Hello& hello, std::vector<std::string> reaches) {
     Peer peer{"a", 0, {}, {}};
     EXPECT_FALSE(say(peer, hello));
-    const auto w = std::get<wire::Welcome>(decoded(*table().work(), "a"));
+    const auto w = std::get<wire::Welcome>(decoded(*table().work(now), "a"));
     EXPECT_EQ(w.reaches, reaches);
     peer.session = w.session;
     peer.id_of = w.table.id;
@@ -433,7 +535,7 @@ TEST_F(Sessions, DamagedMessagesNeverCrash) {
       bytes[random() % bytes.size()] ^= static_cast<std::byte>(1U << (random() % 8));
       if (i % 3 == 0) bytes.resize(random() % bytes.size());
       table().receive("evil" + std::to_string(i % 5), bytes, now);
-      table().work();
+      table().work(now);
     }
   }
   EXPECT_LE(table().size(), 6U);
@@ -477,7 +579,7 @@ TEST_F(Sessions, HelloAgainBeginsANewSession) {
   pose(a, 1, {4, 1, 4});
   const Peer again = greet("a");
   EXPECT_NE(a.session, again.session);
-  EXPECT_FALSE(table().work()) << "the pose was of the old session";
+  EXPECT_FALSE(table().work(now)) << "the pose was of the old session";
   EXPECT_EQ(reason(pose(a, 2, {4, 1, 4})), Refusal::kSession);
   pose(again, 1, {4, 1, 4}, 1);
   EXPECT_EQ(next_pvs(again).base, 0U) << "a new session remembers no sets";
@@ -503,7 +605,7 @@ TEST_F(Sessions, AFloodOfGreetingsStaysWithinBounds) {
   for (int i = 0; i < 1000; ++i)
     say({"0", 0, {}, {}}, wire::Hello{});
   int answered = 0;
-  while (table().work())
+  while (table().work(now))
     ++answered;
   EXPECT_EQ(answered, 4);
 }
