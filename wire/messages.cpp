@@ -16,7 +16,7 @@ using flatbuffers::FlatBufferBuilder;
 
 constexpr std::size_t kSmallestMessage = 12;
 
-// Generous for our five kinds of table, hopeless for a hostile one.
+// Generous for our kinds of table, hopeless for a hostile one.
 constexpr flatbuffers::uoffset_t kMaxDepth = 4;
 constexpr flatbuffers::uoffset_t kMaxTables = 4;
 
@@ -38,6 +38,34 @@ Result<Pace> from_fb(const fb::Speeds& s) {
   if (!pace.valid())
     return input_error("speeds: not finite, negative, above 1e6 m/s or frames above an hour");
   return pace;
+}
+
+fb::Change to_fb(std::uint8_t what, ObjectId id, const Placement& p, float speed) {
+  IVIS_ASSERT(p.valid(), "a placement is finite and a rotation");
+  return {to_fb(p.position), p.rotation.x, p.rotation.y, p.rotation.z,
+          p.rotation.w,      speed,        id,           what};
+}
+
+enum : std::uint8_t { kRemoved = 1, kOccluderOff = 2, kMoved = 4, kAllFlags = 7 };
+
+fb::Change to_fb(const ObjectState& s) {
+  const int flags =
+      (s.removed ? kRemoved : 0) | (s.occluder_off ? kOccluderOff : 0) | (s.moved ? kMoved : 0);
+  return to_fb(static_cast<std::uint8_t>(flags), s.id, s.placement, s.speed_m_s);
+}
+
+Status check(const fb::Change& c) {
+  const Placement p{from_fb(c.position()),
+                    {c.rotation_w(), c.rotation_x(), c.rotation_y(), c.rotation_z()}};
+  if (!p.valid())
+    return input_error("object " + std::to_string(c.id()) +
+                       ": a position not finite or beyond 1e6 m, or a rotation that is none");
+  if (!(c.speed() >= 0 && c.speed() <= kFastestMoverMs))
+    return input_error("object " + std::to_string(c.id()) + ": a speed not from 0 to 1000 m/s");
+  return ok();
+}
+Placement placement_of(const fb::Change& c) {
+  return {from_fb(c.position()), {c.rotation_w(), c.rotation_x(), c.rotation_y(), c.rotation_z()}};
 }
 
 // ---- encoding: one function a message, children before the envelope ----
@@ -86,7 +114,7 @@ flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Welcome& m) {
 
 flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const PoseMessage& m) {
   IVIS_ASSERT(finite(m.eye), "a pose is finite");
-  const fb::Pose pose(m.session, m.sequence, m.have_pvs, to_fb(m.eye), m.hold_us);
+  const fb::Pose pose(m.session, m.sequence, m.have_pvs, to_fb(m.eye), m.hold_us, m.epoch);
   fb::EnvelopeBuilder e(b);
   e.add_pose(&pose);
   return e.Finish();
@@ -98,12 +126,22 @@ flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const PvsMessage& m)
   if (!m.everything)
     payload =
         b.CreateVector(reinterpret_cast<const std::uint8_t*>(m.payload.data()), m.payload.size());
+  flatbuffers::Offset<fb::Changes> changes = 0;
+  if (m.changes.epoch != 0) {
+    flatbuffers::Offset<flatbuffers::Vector<const fb::Change*>> objects = 0;
+    std::vector<fb::Change> states;
+    for (const ObjectState& o : m.changes.objects)
+      states.push_back(to_fb(o));
+    if (!states.empty()) objects = b.CreateVectorOfStructs(states);
+    changes = fb::CreateChanges(b, m.changes.epoch, m.changes.since, m.changes.valid_us, objects);
+  }
   const fb::Pvs pvs(static_cast<std::uint32_t>(m.session),
                     static_cast<std::uint32_t>(m.session >> 32U), m.sequence, m.base, m.solve_us,
                     m.rung, m.safe);
   const fb::Vec3 centre = to_fb(m.eye.value_or(Vec3(0)));
   fb::EnvelopeBuilder e(b);
   if (m.eye) e.add_centre(&centre);
+  if (m.changes.epoch != 0) e.add_changes(changes);
   e.add_payload(payload);
   e.add_pvs(&pvs);
   return e.Finish();
@@ -128,6 +166,32 @@ flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const PaceMessage& m
   const fb::Pace pace(m.session, to_fb(m.pace));
   fb::EnvelopeBuilder e(b);
   e.add_pace(&pace);
+  return e.Finish();
+}
+
+flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const EditMessage& m) {
+  IVIS_ASSERT(!m.edits.empty() && m.edits.size() <= kMaxEdits, "1 to kMaxEdits edits");
+  std::vector<fb::Change> changes;
+  for (const Edit& e : m.edits)
+    changes.push_back(to_fb(static_cast<std::uint8_t>(e.kind), e.id, e.placement, e.speed_m_s));
+  const auto edit = fb::CreateEdit(b, m.session, m.request, b.CreateVectorOfStructs(changes));
+  fb::EnvelopeBuilder e(b);
+  e.add_edit(edit);
+  return e.Finish();
+}
+
+flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const EditedMessage& m) {
+  const auto text = put_string(b, m.text, kMaxTextBytes);
+  const auto edited = fb::CreateEdited(b, m.session, m.request, m.epoch, text);
+  fb::EnvelopeBuilder e(b);
+  e.add_edited(edited);
+  return e.Finish();
+}
+
+flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const NoticeMessage& m) {
+  const fb::Notice notice(m.session, m.epoch);
+  fb::EnvelopeBuilder e(b);
+  e.add_notice(&notice);
   return e.Finish();
 }
 
@@ -187,7 +251,44 @@ Result<Message> get(const fb::Pose& m) {
   const Vec3 eye = from_fb(m.eye());
   if (!finite(eye))
     return input_error("pose " + std::to_string(m.sequence()) + ": eye is not finite");
-  return Message(PoseMessage{m.session(), m.sequence(), m.have_pvs(), eye, m.hold_us()});
+  return Message(PoseMessage{m.session(), m.sequence(), m.have_pvs(), eye, m.hold_us(), m.epoch()});
+}
+
+Result<SceneChanges> get(const fb::Changes& m) {
+  SceneChanges out{m.epoch(), m.since(), m.valid_us(), {}};
+  if (out.epoch == 0 || out.since > out.epoch)
+    return input_error("changes: epoch " + std::to_string(out.epoch) + " told against " +
+                       std::to_string(out.since));
+  if (m.objects() == nullptr) return out;
+  for (const fb::Change* c : *m.objects()) {
+    if (const auto s = check(*c); !s) return s.error();
+    if (c->what() > kAllFlags)
+      return input_error("changes: unknown flags " + std::to_string(c->what()));
+    out.objects.push_back({c->id(), (c->what() & kRemoved) != 0, (c->what() & kOccluderOff) != 0,
+                           (c->what() & kMoved) != 0, placement_of(*c), c->speed()});
+  }
+  return out;
+}
+
+Result<Message> get(const fb::Edit& m) {
+  const std::size_t count = m.changes() == nullptr ? 0 : m.changes()->size();
+  if (count == 0 || count > kMaxEdits)
+    return input_error("edit: " + std::to_string(count) + " edits, expected 1 to " +
+                       std::to_string(kMaxEdits));
+  EditMessage out{m.session(), m.request(), {}};
+  for (const fb::Change* c : *m.changes()) {
+    if (const auto s = check(*c); !s) return s.error();
+    if (c->what() < static_cast<int>(EditKind::kMove) ||
+        c->what() > static_cast<int>(EditKind::kOccluderOn))
+      return input_error("edit: unknown kind " + std::to_string(c->what()));
+    out.edits.push_back({static_cast<EditKind>(c->what()), c->id(), placement_of(*c), c->speed()});
+  }
+  return Message(std::move(out));
+}
+
+Result<Message> get(const fb::Edited& m) {
+  if (const auto s = check_string(m.text(), kMaxTextBytes, "edited: text"); !s) return s.error();
+  return Message(EditedMessage{m.session(), m.request(), m.epoch(), text_of(m.text())});
 }
 
 Result<Message> get(const fb::Envelope& e, const fb::Pvs& m) {
@@ -199,6 +300,11 @@ Result<Message> get(const fb::Envelope& e, const fb::Pvs& m) {
   out.rung = m.rung();
   out.safe = m.safe();
   out.everything = e.payload() == nullptr;
+  if (e.changes() != nullptr) {
+    auto changes = get(*e.changes());
+    if (!changes) return changes.error();
+    out.changes = std::move(*changes);
+  }
   if (e.centre() != nullptr) {
     out.eye = from_fb(*e.centre());
     if (!finite(*out.eye))
@@ -222,17 +328,23 @@ Result<Message> get(const fb::Refused& m) {
 Result<Message> get(const fb::Envelope& e) {
   const int kinds = (e.pvs() != nullptr) + (e.pose() != nullptr) + (e.hello() != nullptr) +
                     (e.welcome() != nullptr) + (e.refused() != nullptr) + (e.bye() != nullptr) +
-                    (e.pace() != nullptr);
+                    (e.pace() != nullptr) + (e.edit() != nullptr) + (e.edited() != nullptr) +
+                    (e.notice() != nullptr);
   if (kinds != 1)
     return input_error("message: " + std::to_string(kinds) +
                        " known kinds in one envelope, expected 1");
-  if (e.pvs() == nullptr && (e.payload() != nullptr || e.centre() != nullptr))
-    return input_error("message: a payload or centre without a pvs");
+  if (e.pvs() == nullptr &&
+      (e.payload() != nullptr || e.centre() != nullptr || e.changes() != nullptr))
+    return input_error("message: a payload, centre or changes without a pvs");
   if (e.pvs() != nullptr) return get(e, *e.pvs());
   if (e.pose() != nullptr) return get(*e.pose());
   if (e.hello() != nullptr) return get(*e.hello());
   if (e.welcome() != nullptr) return get(*e.welcome());
   if (e.refused() != nullptr) return get(*e.refused());
+  if (e.edit() != nullptr) return get(*e.edit());
+  if (e.edited() != nullptr) return get(*e.edited());
+  if (e.notice() != nullptr)
+    return Message(NoticeMessage{e.notice()->session(), e.notice()->epoch()});
   if (e.pace() != nullptr) {
     const auto pace = from_fb(e.pace()->speeds());
     if (!pace) return pace.error();

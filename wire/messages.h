@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/edit.h"
 #include "core/ids.h"
 #include "core/math.h"
 #include "core/pace.h"
@@ -19,7 +20,7 @@
 
 namespace ivis::wire {
 
-inline constexpr std::uint16_t kProtocolVersion = 2;
+inline constexpr std::uint16_t kProtocolVersion = 3;
 
 /// Client -> server, first.
 struct Hello {
@@ -72,7 +73,17 @@ struct PoseMessage {
   /// How long a PVS is in use past its pose, as the client measures it; 0: unknown. With the speeds
   /// told it decides the cell.
   std::uint32_t hold_us = 0;
+  std::uint32_t epoch = 0;  ///< of the scene as the client has it; 0: as in the file
   bool operator==(const PoseMessage&) const = default;
+};
+
+/// The scene that a PVS is of.
+struct SceneChanges {
+  std::uint32_t epoch = 0;
+  std::uint32_t since = 0;           ///< what `objects` are told against; 0: the scene file
+  std::uint32_t valid_us = 0;        ///< after the sending of the pose; 0: no end
+  std::vector<ObjectState> objects;  ///< that changed, as they are now; each once
+  bool operator==(const SceneChanges&) const = default;
 };
 
 /// Server -> client, pushed.
@@ -91,6 +102,7 @@ struct PvsMessage {
   std::uint16_t safe = kAllSafe;
   static constexpr std::uint16_t kAllSafe = 65535;
   std::vector<std::byte> payload;  ///< wire/pvs_codec.h
+  SceneChanges changes;            ///< costs some 36 bytes when the scene was changed ever
   bool operator==(const PvsMessage&) const = default;
 };
 
@@ -125,7 +137,32 @@ struct Bye {
   bool operator==(const Bye&) const = default;
 };
 
-using Message = std::variant<Hello, Welcome, PoseMessage, PvsMessage, Refused, Bye, PaceMessage>;
+/// Client -> server: all of it or nothing is done, in this order.
+struct EditMessage {
+  std::uint64_t session = 0;
+  std::uint32_t request = 0;  ///< named in the answer
+  std::vector<Edit> edits;    ///< 1 to kMaxEdits
+  bool operator==(const EditMessage&) const = default;
+};
+
+/// Server -> client, the answer to an EditMessage.
+struct EditedMessage {
+  std::uint64_t session = 0;
+  std::uint32_t request = 0;
+  std::uint32_t epoch = 0;  ///< the scene as changed; 0: refused
+  std::string text;         ///< why
+  bool operator==(const EditedMessage&) const = default;
+};
+
+/// Server -> client: a pose will be answered for this epoch of the scene, or a later one.
+struct NoticeMessage {
+  std::uint64_t session = 0;
+  std::uint32_t epoch = 0;
+  bool operator==(const NoticeMessage&) const = default;
+};
+
+using Message = std::variant<Hello, Welcome, PoseMessage, PvsMessage, Refused, Bye, PaceMessage,
+                             EditMessage, EditedMessage, NoticeMessage>;
 
 inline constexpr std::size_t kMaxMessageBytes = 64U << 20U;
 /// A row of the table is 12 bytes, 16 with clusters.
@@ -133,7 +170,8 @@ inline constexpr std::size_t kMaxObjects = kMaxMessageBytes / 12;
 inline constexpr std::size_t kMaxClusters = kMaxMessageBytes / 16;  ///< objects in such a table
 inline constexpr std::size_t kMaxNameBytes = 256;                   ///< reach, method
 inline constexpr std::size_t kMaxRungs = 32;                        ///< Welcome::reaches
-inline constexpr std::size_t kMaxTextBytes = 1024;                  ///< Refused::text
+inline constexpr std::size_t kMaxTextBytes = 1024;                  ///< of refusals
+inline constexpr std::size_t kMaxEdits = 1024;
 
 /// One message as one frame. Strings are cut to their bounds. Requires: finite eyes; a table that
 /// is empty or has `objects` rows and whose ids are a permutation, at most kMaxObjects of

@@ -15,7 +15,7 @@ using flatbuffers::FlatBufferBuilder;
 
 const fb::Bye kBye(1);
 const fb::Pvs kPvs(1, 0, 2, 0, 3, 0, 65535);
-const fb::Pose kPose(1, 2, 0, fb::Vec3(1, 2, 3), 0);
+const fb::Pose kPose(1, 2, 0, fb::Vec3(1, 2, 3), 0, 0);
 
 std::string error_of(FlatBufferBuilder& b, flatbuffers::Offset<fb::Envelope> envelope) {
   b.FinishSizePrefixed(envelope);
@@ -37,9 +37,9 @@ TEST(WireEnvelope, MustHoldPayloadAndCentreOnlyWithAPvs) {
   FlatBufferBuilder a, b, c;
   const auto in_a = a.CreateVector(payload);
   EXPECT_EQ(error_of(a, fb::CreateEnvelope(a, nullptr, in_a, nullptr, &kPose)),
-            "message: a payload or centre without a pvs");
+            "message: a payload, centre or changes without a pvs");
   EXPECT_EQ(error_of(b, fb::CreateEnvelope(b, nullptr, 0, &centre, &kPose)),
-            "message: a payload or centre without a pvs");
+            "message: a payload, centre or changes without a pvs");
   const auto in_c = c.CreateVector(payload);
   EXPECT_EQ(error_of(c, fb::CreateEnvelope(c, &kPvs, in_c, &centre)), "no error");
 }
@@ -105,6 +105,43 @@ TEST(WireEnvelope, MustTellSpeedsThatAreSpeeds) {
 }
 
 // A writer in another language may put tables and vectors in any order.
+TEST(WireEnvelope, MustBringKnownEditsAndNotTooMany) {
+  const auto edit_of = [](std::size_t count, std::uint8_t kind) {
+    FlatBufferBuilder b;
+    const std::vector<fb::Change> changes(count,
+                                          fb::Change(fb::Vec3(0, 0, 0), 0, 0, 0, 1, 0, 0, kind));
+    const auto edit = fb::CreateEdit(b, 1, 2, b.CreateVectorOfStructs(changes));
+    fb::EnvelopeBuilder e(b);
+    e.add_edit(edit);
+    return error_of(b, e.Finish());
+  };
+  EXPECT_EQ(edit_of(1, 1), "no error");
+  EXPECT_EQ(edit_of(kMaxEdits, 5), "no error");
+  EXPECT_EQ(edit_of(0, 1), "edit: 0 edits, expected 1 to 1024");
+  EXPECT_EQ(edit_of(kMaxEdits + 1, 1), "edit: 1025 edits, expected 1 to 1024");
+  EXPECT_EQ(edit_of(1, 0), "edit: unknown kind 0");
+  EXPECT_EQ(edit_of(1, 6), "edit: unknown kind 6");
+}
+
+TEST(WireEnvelope, MustHoldChangesOnlyWithAPvsAndKnownFlags) {
+  const auto changes_with = [](bool pvs, std::uint8_t flags) {
+    FlatBufferBuilder b;
+    const std::vector<fb::Change> objects(1,
+                                          fb::Change(fb::Vec3(0, 0, 0), 0, 0, 0, 1, 0, 0, flags));
+    const auto changes = fb::CreateChanges(b, 1, 0, 0, b.CreateVectorOfStructs(objects));
+    fb::EnvelopeBuilder e(b);
+    e.add_changes(changes);
+    if (pvs)
+      e.add_pvs(&kPvs);
+    else
+      e.add_pose(&kPose);
+    return error_of(b, e.Finish());
+  };
+  EXPECT_EQ(changes_with(true, 7), "no error");
+  EXPECT_EQ(changes_with(true, 8), "changes: unknown flags 8");
+  EXPECT_EQ(changes_with(false, 0), "message: a payload, centre or changes without a pvs");
+}
+
 TEST(WireEnvelope, MayBeLaidOutInAnotherOrder) {
   FlatBufferBuilder b;
   b.ForceDefaults(true);

@@ -24,6 +24,14 @@ PvsMessage pvs_of(std::size_t payload) {
   return m;
 }
 
+PvsMessage changed_pvs() {
+  PvsMessage changed = pvs_of(31);
+  changed.changes = {6, 4, 50'000, {}};
+  changed.changes.objects = {{3, true, false, false, {}, 0},
+                             {5, false, true, true, {{1, 2, 1234.5}, {1, 0, 0, 0}}, 30}};
+  return changed;
+}
+
 std::vector<Message> samples() {
   PvsMessage centred = pvs_of(31);
   centred.eye = Vec3(1, -2, 3.25);
@@ -47,6 +55,16 @@ std::vector<Message> samples() {
           everything,
           Refused{12, Refusal::kScene, "another scene"},
           Refused{},
+          PoseMessage{1, 2, 3, {4, 5, -6}, 16667, 5},
+          EditMessage{7, 1, {{EditKind::kRemove, 4, {}, 0}}},
+          EditMessage{7,
+                      2,
+                      {{EditKind::kMove, 1, {{1, -2, 1e6}, {0, 0, 0, 1}}, 1000},
+                       {EditKind::kOccluderOn, 2, {}, 0}}},
+          EditedMessage{7, 2, 3, ""},
+          EditedMessage{7, 2, 0, "no"},
+          NoticeMessage{7, 3},
+          changed_pvs(),
           Bye{99}};
 }
 
@@ -157,6 +175,36 @@ TEST(WireDecoder, RejectsNumbersThatAreNotFinite) {
     EXPECT_NE(error_of(patched(encode(m), x, bad)).find("pvs 7: centre is not finite"),
               std::string::npos);
   }
+}
+
+TEST(WireDecoder, RejectsPlacementsThatAreNone) {
+  const double x = 1234.5;
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(),
+                           std::numeric_limits<double>::infinity(), 1.1e6, -1.1e6}) {
+    const EditMessage edit{1, 2, {{EditKind::kMove, 3, {{0, x, 0}, {1, 0, 0, 0}}, 0}}};
+    EXPECT_NE(error_of(patched(encode(edit), x, bad)).find("object 3: a position"),
+              std::string::npos);
+    EXPECT_NE(error_of(patched(encode(changed_pvs()), x, bad)).find("object 5: a position"),
+              std::string::npos);
+  }
+  const float w = 0.6F;
+  const EditMessage turned{1, 2, {{EditKind::kMove, 3, {{0, 0, 0}, {w, 0.8F, 0, 0}}, 12.5F}}};
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.7F, 1e30F})
+    EXPECT_NE(error_of(patched(encode(turned), w, bad)).find("or a rotation that is none"),
+              std::string::npos);
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), -1.0F, 1001.0F})
+    EXPECT_NE(error_of(patched(encode(turned), 12.5F, bad)).find("object 3: a speed"),
+              std::string::npos);
+}
+
+TEST(WireDecoder, RejectsChangesThatContradictThemselves) {
+  PvsMessage m = changed_pvs();
+  m.changes.epoch = 0x5a6b7c8d;
+  EXPECT_NE(error_of(patched(encode(m), m.changes.epoch, 0U)).find("changes: epoch 0"),
+            std::string::npos);
+  m.changes.since = 0x5a6b7c80;
+  EXPECT_NE(error_of(patched(encode(m), m.changes.since, 0x5a6b7c8eU)).find("told against"),
+            std::string::npos);
 }
 
 TEST(WireDecoder, RejectsAnUnknownReason) {
