@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <exception>
+#include <span>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "client_lib/client.h"
 #include "client_lib/network_source.h"
@@ -20,6 +23,7 @@ constexpr const char* kBadPace =
     "a pace out of bounds, expected speeds of 0 to 1e6 m/s and frames of 0 to 3600 s";
 
 constexpr std::uint32_t kMostLingerFrames = 3600;
+constexpr std::size_t kMostEdits = 1024;  // a message takes no more
 
 ivis::Pace pace_of(const ivis_pace& p) {
   return {p.horizontal_m_s, p.vertical_m_s, p.frame_s};
@@ -175,6 +179,65 @@ ivis_status ivis_client_wait(ivis_client* client, int32_t timeout_ms) {
   return guarded(client, [&] { return client->wait(std::chrono::milliseconds(timeout_ms)); });
 }
 
+ivis_status ivis_client_edit(ivis_client* client, const ivis_edit* edits, size_t count,
+                             uint32_t* request) {
+  if (client == nullptr || edits == nullptr) return IVIS_ERROR_ARGUMENT;
+  return guarded(client, [&] {
+    if (count == 0 || count > kMostEdits)
+      return client->fail(IVIS_ERROR_ARGUMENT, std::to_string(count) + " edits, expected 1 to " +
+                                                   std::to_string(kMostEdits));
+    std::vector<ivis::Edit> wanted;
+    for (const ivis_edit& e : std::span(edits, count)) {
+      ivis::Edit edit{static_cast<ivis::EditKind>(e.kind), e.id, {}, 0};
+      if (e.kind < IVIS_EDIT_MOVE || e.kind > IVIS_EDIT_OCCLUDER_ON)
+        return client->fail(IVIS_ERROR_ARGUMENT, "unknown kind of edit " + std::to_string(e.kind));
+      if (e.kind == IVIS_EDIT_MOVE) {
+        edit.placement = {vec(e.position),
+                          {e.rotation[3], e.rotation[0], e.rotation[1], e.rotation[2]}};
+        edit.speed_m_s = e.speed_m_s;
+        if (!edit.placement.valid() || !(e.speed_m_s >= 0 && e.speed_m_s <= ivis::kFastestMoverMs))
+          return client->fail(IVIS_ERROR_ARGUMENT,
+                              "object " + std::to_string(e.id) +
+                                  ": a position beyond 1e6 m, a rotation that is no unit "
+                                  "quaternion, or a speed not from 0 to 1000 m/s");
+      }
+      wanted.push_back(edit);
+    }
+    std::uint32_t number = 0;
+    const ivis_status asked = client->edit(wanted, number);
+    if (request != nullptr) *request = number;
+    return asked;
+  });
+}
+
+int ivis_client_edit_result(ivis_client* client, ivis_edit_result* out) {
+  if (client == nullptr || out == nullptr) return 0;
+  *out = ivis_edit_result{0, 0, ""};
+  int found = 0;
+  guarded(client, [&] {
+    if (auto result = client->edited()) {
+      found = 1;
+      out->request = result->request;
+      out->epoch = result->epoch;
+      out->refused = client->keep(std::move(result->why));
+    }
+    return IVIS_OK;
+  });
+  return found;
+}
+
+ivis_status ivis_client_changes(ivis_client* client, const ivis_object_state** states,
+                                size_t* count) {
+  if (client == nullptr || states == nullptr || count == nullptr) return IVIS_ERROR_ARGUMENT;
+  *states = nullptr;
+  *count = 0;
+  return guarded(client, [&] {
+    *states = client->changes().data();
+    *count = client->changes().size();
+    return IVIS_OK;
+  });
+}
+
 void ivis_client_stats(const ivis_client* client, ivis_stats* out) {
   if (out == nullptr) return;
   *out = client != nullptr ? client->stats() : ivis_stats{};
@@ -249,6 +312,8 @@ const char* ivis_cause_name(ivis_cause cause) {
       return "late";
     case IVIS_CAUSE_OTHER:
       return "other";
+    case IVIS_CAUSE_EXPIRED:
+      return "expired";
   }
   return "unknown";
 }

@@ -28,6 +28,20 @@ void put(const Vec3& v, double (&out)[3]) {
     out[k] = v[k];
 }
 
+ivis_object_state told(const ivis::ObjectState& s) {
+  ivis_object_state out{};
+  out.id = s.id;
+  out.removed = s.removed ? 1 : 0;
+  out.occluder_off = s.occluder_off ? 1 : 0;
+  out.moved = s.moved ? 1 : 0;
+  put(s.placement.position, out.position);
+  const glm::fquat& q = s.placement.rotation;
+  const float rotation[4] = {q.x, q.y, q.z, q.w};
+  std::copy(std::begin(rotation), std::end(rotation), out.rotation);
+  out.speed_m_s = s.speed_m_s;
+  return out;
+}
+
 }  // namespace
 
 namespace ivis::client {
@@ -110,10 +124,55 @@ ivis_status ivis_client::state() {
 
 void ivis_client::take() {
   if (!source_->receive(answer_)) return;
+  note_changes();
   stats_.last_solve_ms = answer_.solve_ms;
   cell_reach_ = answer_.cell.reach.to_string();
   if (const Sent* s = sent(answer_.sequence))
     stats_.last_round_trip_ms = milliseconds(options_.now() - s->at);
+}
+
+/// The scene of an answer is drawn as soon as the answer is used: at the next view.
+void ivis_client::note_changes() {
+  std::map<ivis::ObjectId, ivis::ObjectState> before;
+  if (answer_.from_the_file) before.swap(states_);
+  for (const ivis::ObjectState& s : answer_.changes) {
+    before.erase(s.id);
+    states_[s.id] = untold_[s.id] = s;
+  }
+  for (const auto& [id, state] : before)  // is as in the file again
+    untold_[id] = {id, false, false, false, {}, 0};
+}
+
+bool ivis_client::expired(Time now) const {
+  if (answer_.sequence == 0 || answer_.valid_us == 0 || answer_.everything) return false;
+  const Sent* s = sent(answer_.sequence);
+  return s == nullptr || now - s->at > std::chrono::microseconds(answer_.valid_us);
+}
+
+/// Is nothing under way that would bring the scene as it is now?
+bool ivis_client::wants_another(Time now) const {
+  if (answer_.sequence == 0 || answer_.sequence != sequence_) return false;
+  if (source_->epoch() > answer_.epoch) return true;
+  const Sent* s = sent(answer_.sequence);
+  return answer_.valid_us != 0 &&
+         (s == nullptr || now - s->at > std::chrono::microseconds(answer_.valid_us / 2));
+}
+
+ivis_status ivis_client::edit(std::span<const ivis::Edit> edits, std::uint32_t& request) {
+  const auto asked = source_->edit(edits);
+  if (!asked) return fail(ivis::client::status_of(asked.error()), asked.error().message);
+  request = *asked;
+  return IVIS_OK;
+}
+
+const char* ivis_client::keep(std::string text) {
+  kept_ = std::move(text);
+  return kept_.c_str();
+}
+
+std::optional<ivis::client::EditResult> ivis_client::edited() {
+  take();
+  return source_->edited();
 }
 
 ivis_status ivis_client::pose(const Vec3& eye) {
@@ -180,6 +239,7 @@ const IdBits& ivis_client::all_bits() {
 ivis_cause ivis_client::why_outside(const Vec3& eye, Time now) const {
   if (answer_.sequence == 0) return IVIS_CAUSE_NO_ANSWER;
   if (!source_->connected()) return IVIS_CAUSE_DISCONNECTED;
+  if (answer_.cell.contains(eye) && expired(now)) return IVIS_CAUSE_EXPIRED;
   const Sent* s = sent(answer_.sequence);
   if (s == nullptr) return IVIS_CAUSE_LATE;
   const ivis::Pace& pace = options_.pace;
@@ -196,10 +256,17 @@ ivis_cause ivis_client::why_outside(const Vec3& eye, Time now) const {
 
 ivis_status ivis_client::view(const Vec3& eye, ivis_frame& out) {
   take();
+  const Time now = options_.now();
+  if (finite(eye) && wants_another(now)) {
+    if (const ivis_status posed = pose(eye); posed != IVIS_OK) return posed;
+  }
+  changes_.clear();
+  for (const auto& [id, state] : untold_)
+    changes_.push_back(told(state));
+  untold_.clear();
   out = {};
   put(eye, out.eye);
   ++stats_.frames;
-  const Time now = options_.now();
   const ivis::client::Catalogue* catalogue = source_->catalogue();
   const std::uint32_t objects = catalogue != nullptr ? catalogue->objects() : 0;
   const bool has_pvs = answer_.sequence != 0;
@@ -222,7 +289,8 @@ ivis_status ivis_client::view(const Vec3& eye, ivis_frame& out) {
   in_use_ = answer_.sequence;
 
   // A PVS that lists everything is complete wherever the eye is.
-  const bool inside = sound && has_pvs && (answer_.everything || answer_.cell.contains(eye));
+  const bool inside =
+      sound && has_pvs && !expired(now) && (answer_.everything || answer_.cell.contains(eye));
   bool covered = inside;
   bool use_pvs = inside;
   if (sound && !inside) {
@@ -247,6 +315,7 @@ ivis_status ivis_client::view(const Vec3& eye, ivis_frame& out) {
   out.safe = 1;
   if (has_pvs) {
     out.sequence = answer_.sequence;
+    out.epoch = answer_.epoch;
     put(answer_.cell.eye, out.cell_eye);
     out.safe = answer_.safe;
     if (const Sent* s = sent(answer_.sequence)) out.pvs_age_s = seconds(now - s->at);

@@ -4,8 +4,12 @@
 #include <array>
 #include <chrono>
 #include <functional>
+#include <map>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "client_lib/include/ivis/ivis.h"
 #include "client_lib/lingering.h"
@@ -35,6 +39,13 @@ struct ivis_client {
   void set_policy(ivis_policy policy) { options_.policy = policy; }
   void set_pace(const ivis::Pace& pace);
 
+  ivis_status edit(std::span<const ivis::Edit> edits, std::uint32_t& request);
+  std::optional<ivis::client::EditResult> edited();
+  /// What changed with the last view.
+  const std::vector<ivis_object_state>& changes() const { return changes_; }
+  /// A text for the caller, until the next.
+  const char* keep(std::string text);
+
   const ivis::client::PvsSource& source() const { return *source_; }
   const std::string& error() const { return error_; }
   ivis_stats stats() const;
@@ -44,6 +55,9 @@ struct ivis_client {
   ivis_status state();
   const ivis::client::IdBits& all_bits();
   ivis_cause why_outside(const ivis::Vec3& eye, Time now) const;
+  void note_changes();
+  bool expired(Time now) const;
+  bool wants_another(Time now) const;
 
   struct Sent {
     std::uint32_t sequence = 0;
@@ -61,6 +75,10 @@ struct ivis_client {
   std::string cell_reach_;
   Time met_{};  ///< when the present session was first noticed
   ivis::client::Answer answer_;
+  std::map<ivis::ObjectId, ivis::ObjectState> states_;  ///< of objects not as in the file
+  std::map<ivis::ObjectId, ivis::ObjectState> untold_;  ///< changes since the last view
+  std::vector<ivis_object_state> changes_;
+  std::string kept_;
   ivis::client::IdBits all_;
   std::uint32_t sequence_ = 0;
   std::array<Sent, 256> sent_{};  ///< by sequence, to time round trips

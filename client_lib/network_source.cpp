@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cerrno>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -26,6 +27,8 @@ constexpr auto kBusyPause = std::chrono::milliseconds(1000);
 constexpr auto kSendAgain = std::chrono::milliseconds(2);
 constexpr auto kTimers = std::chrono::milliseconds(50);
 constexpr std::size_t kRememberedEyes = 1024;
+/// Edits under way, and results that nobody has taken; each.
+constexpr std::size_t kMostRequests = 1024;
 
 /// One a process, for as long as somebody uses it: it owns a thread that moves bytes.
 std::shared_ptr<zmq::context_t> shared_context() {
@@ -97,11 +100,13 @@ struct NetworkSource::Impl {
     if (!waiting_since) waiting_since = now;  // also while the pose cannot leave
     const Eye& eye = eyes[sequence % kRememberedEyes];
     // What is not known as a base is not acknowledged: the answer then is a full set.
-    if (!put(wire::PoseMessage{session, sequence, history.newest(), eye.at, hold_us})) return;
+    if (!put(wire::PoseMessage{session, sequence, history.newest(), eye.at, hold_us, have_epoch}))
+      return;
     pose_due = false;
   }
 
   void begin_again(std::string why, Clock::time_point hello_at) {
+    lose_edits();
     session = 0;
     next_hello = hello_at;
     waiting_since.reset();
@@ -109,8 +114,26 @@ struct NetworkSource::Impl {
   }
 
   void fail(Error error) {
+    lose_edits();
     session = 0;
     failed = std::move(error);
+  }
+
+  void lose_edits() {
+    for (const std::uint32_t request : asked)
+      add_result({request, 0, "the session ended before an answer: it may have been done"});
+    asked.clear();
+  }
+
+  void add_result(EditResult result) {
+    if (results.size() >= kMostRequests) results.pop_front();
+    results.push_back(std::move(result));
+  }
+
+  void handle(wire::EditedMessage& m) {
+    if (m.session != session || std::erase(asked, m.request) == 0) return;
+    add_result({m.request, m.epoch, std::move(m.text)});
+    known_epoch = std::max(known_epoch, m.epoch);
   }
 
   /// Takes in all that has arrived. Only the newest PVS is decoded: each names its own base.
@@ -138,6 +161,10 @@ struct NetworkSource::Impl {
         ++counted.answers;
         counted.bytes += message.size();
         if (!newest || pvs->sequence > newest->sequence) newest = std::move(*pvs);
+      } else if (auto* edited = std::get_if<wire::EditedMessage>(&*decoded)) {
+        handle(*edited);
+      } else if (const auto* notice = std::get_if<wire::NoticeMessage>(&*decoded)) {
+        if (notice->session == session) known_epoch = std::max(known_epoch, notice->epoch);
       } else if (auto* welcome = std::get_if<wire::Welcome>(&*decoded)) {
         handle(*welcome);
       } else if (const auto* refused = std::get_if<wire::Refused>(&*decoded)) {
@@ -205,7 +232,9 @@ struct NetworkSource::Impl {
     catalogue = std::move(told);
     id_of = std::move(w.table.id);
     scene_hash = w.scene_hash;
+    lose_edits();
     session = w.session;
+    have_epoch = known_epoch = 0;
     history.clear();
     newest.reset();
     last_trouble.clear();
@@ -248,6 +277,14 @@ struct NetworkSource::Impl {
     a.cell = {m.eye.value_or(eye.at), catalogue->reaches[m.rung]};
     a.safe = static_cast<double>(m.safe) / wire::PvsMessage::kAllSafe;
     a.solve_ms = m.solve_us / 1000.0;
+    if (m.changes.epoch < have_epoch || m.changes.since > have_epoch)
+      return bad("a PVS of a scene that is no more, or told against one that never was");
+    for (const ObjectState& o : m.changes.objects)
+      if (o.id >= catalogue->objects()) return bad("a change of an object that is not there");
+    a.epoch = m.changes.epoch;
+    a.valid_us = m.changes.valid_us;
+    a.changes = m.changes.objects;
+    a.from_the_file = m.changes.since == 0;
     a.everything = m.everything;
     if (m.everything) {
       a.count = catalogue->objects();
@@ -268,6 +305,8 @@ struct NetworkSource::Impl {
       }
       history.add(m.sequence, std::move(*state));
     }
+    have_epoch = a.epoch;
+    known_epoch = std::max(known_epoch, a.epoch);
     answered = m.sequence;
     if (answered == sequence) waiting_since.reset();
     last_trouble.clear();
@@ -287,9 +326,14 @@ struct NetworkSource::Impl {
   std::optional<Clock::time_point>
       waiting_since;  ///< last sign of life with a pose due or unanswered
   std::array<Eye, kRememberedEyes> eyes{};
-  std::uint32_t sequence = 0;  ///< of the latest pose
-  std::uint32_t answered = 0;  ///< of the latest pose that was
-  std::uint32_t hold_us = 0;   ///< likewise
+  std::uint32_t sequence = 0;     ///< of the latest pose
+  std::uint32_t answered = 0;     ///< of the latest pose that was
+  std::uint32_t hold_us = 0;      ///< likewise
+  std::uint32_t have_epoch = 0;   ///< of the newest PVS of the session
+  std::uint32_t known_epoch = 0;  ///< heard of in the session
+  std::uint32_t requests = 0;
+  std::vector<std::uint32_t> asked;  ///< edits without an answer
+  std::deque<EditResult> results;
   bool pose_due = false;
   bool pace_due = false;
   PvsHistory history;
@@ -302,6 +346,31 @@ struct NetworkSource::Impl {
   std::shared_ptr<zmq::context_t> context;
   zmq::socket_t socket;
 };
+
+std::uint32_t NetworkSource::epoch() const {
+  return impl_->known_epoch;
+}
+
+Result<std::uint32_t> NetworkSource::edit(std::span<const Edit> edits) {
+  Impl& s = *impl_;
+  if (s.failed) return *s.failed;
+  if (s.session == 0) return connection_error("there is no session with the server at present");
+  if (s.asked.size() >= kMostRequests)
+    return connection_error(std::to_string(kMostRequests) + " edits are without an answer");
+  const std::uint32_t request = s.requests + 1;
+  if (!s.put(wire::EditMessage{s.session, request, {edits.begin(), edits.end()}}))
+    return connection_error("the server takes nothing at present");
+  s.requests = request;
+  s.asked.push_back(request);
+  return request;
+}
+
+std::optional<EditResult> NetworkSource::edited() {
+  if (impl_->results.empty()) return std::nullopt;
+  EditResult result = std::move(impl_->results.front());
+  impl_->results.pop_front();
+  return result;
+}
 
 NetworkSource::NetworkSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 NetworkSource::~NetworkSource() = default;

@@ -38,6 +38,9 @@ class NetworkSource : public PvsSource {
   const Error* failure() const override;
   std::string trouble() const override;
   SourceStats stats() const override;
+  std::uint32_t epoch() const override;
+  Result<std::uint32_t> edit(std::span<const Edit> edits) override;
+  std::optional<EditResult> edited() override;
 
  private:
   struct Impl;

@@ -13,7 +13,7 @@ namespace ivis::client {
 namespace {
 
 constexpr std::size_t kMaxRecordBytes = std::size_t{2} << 30U;
-constexpr std::string_view kMagic = "ivis-record 2";
+constexpr std::string_view kMagic = "ivis-record 3";
 
 template <class N>
 void put(std::string& out, N v) {
@@ -88,6 +88,46 @@ Status ids(Words& words, std::uint32_t objects, std::vector<ObjectId>& out) {
     out.push_back(static_cast<ObjectId>(id));
   }
   return ok();
+}
+
+enum : unsigned { kRemoved = 1, kOccluderOff = 2, kMoved = 4 };
+
+Result<ObjectState> object(std::string_view line, const Record& record) {
+  Words words(line);
+  words.next();
+  std::string_view word = words.next();
+  const auto id = number<std::uint32_t>(word);
+  if (!id || *id >= record.objects)
+    return input_error("found " + shown(word) + " as the id of an object, expected one below " +
+                       std::to_string(record.objects));
+  word = words.next();
+  const auto flags = number<std::uint8_t>(word);
+  if (!flags || *flags > 7)
+    return input_error("object: found " + shown(word) + " as flags, expected 0 to 7");
+  ObjectState s;
+  s.id = *id;
+  s.removed = (*flags & kRemoved) != 0;
+  s.occluder_off = (*flags & kOccluderOff) != 0;
+  s.moved = (*flags & kMoved) != 0;
+  if (s.moved) {
+    const auto position = point(words, "the object's position");
+    if (!position) return position.error();
+    s.placement.position = *position;
+    float q[4];
+    for (float& v : q) {
+      word = words.next();
+      const auto value = number<float>(word);
+      if (!value)
+        return input_error("the object's rotation: found " + shown(word) + ", expected a number");
+      v = *value;
+    }
+    s.placement.rotation = {q[3], q[0], q[1], q[2]};
+    if (!s.placement.valid())
+      return input_error("object " + std::to_string(s.id) + ": a placement that is none");
+  }
+  if (!words.done())
+    return input_error("found " + shown(words.rest()) + " behind the object, expected nothing");
+  return s;
 }
 
 Result<RecordedFrame> frame(std::string_view line, const Record& record) {
@@ -183,6 +223,22 @@ std::string encode_record(const Record& record) {
         put(out, p[k]);
       }
     };
+    for (const ObjectState& o : f.edits) {
+      out += "object ";
+      put(out, o.id);
+      out += ' ';
+      put(out, (o.removed ? kRemoved : 0U) | (o.occluder_off ? kOccluderOff : 0U) |
+                   (o.moved ? kMoved : 0U));
+      if (o.moved) {
+        put_point(o.placement.position);
+        const glm::fquat& q = o.placement.rotation;
+        for (const float v : {q.x, q.y, q.z, q.w}) {
+          out += ' ';
+          put(out, v);
+        }
+      }
+      out += '\n';
+    }
     out += "frame ";
     put(out, f.time_s);
     out += ' ';
@@ -243,9 +299,18 @@ Result<Record> decode_record(std::string_view text, const std::string& name) {
   const auto count = objects ? number<std::uint32_t>(*objects) : std::nullopt;
   if (!count) return wrong("expected 'objects' and their number");
   record.objects = *count;
+  std::vector<ObjectState> edits;
   while (!text.empty()) {
-    auto f = frame(next_line(), record);
+    const std::string_view line = next_line();
+    if (line.starts_with("object ")) {
+      auto o = object(line, record);
+      if (!o) return wrong(o.error().message);
+      edits.push_back(*o);
+      continue;
+    }
+    auto f = frame(line, record);
     if (!f) return wrong(f.error().message);
+    f->edits = std::exchange(edits, {});
     record.frames.push_back(std::move(*f));
   }
   return record;

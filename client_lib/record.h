@@ -2,14 +2,16 @@
 // What a walk was told and drew, kept for `ivis verify --record` and `ivis replay`.
 //
 // Text, a line each, numbers in the shortest form that reads back to the same bits:
-//   ivis-record 2
+//   ivis-record 3
 //   scene <hash, 16 hex digits>
 //   reach <the largest reach that cells may have, e.g. disc:1>
 //   objects <N>
 //   frame <time> <sequence> <cell x> <y> <z> <cell's reach> <wanted x> <y> <z> <eye x> <y> <z>
 //         covered|uncovered <cause> everything
 //   frame ... covered|uncovered <cause> <count> <first id> <gap> <gap> ...
-// (a frame is one line). The ids are those whose visibility differs from the last frame that listed
+//   object <id> <flags: 1 removed, 2 occluder off, 4 moved> [<x> <y> <z> <qx> <qy> <qz> <qw>]
+// (a frame is one line; the placement of an object is there when it was moved). Objects that changed
+// come before the frame that first shows them so. The ids are those whose visibility differs from the last frame that listed
 // any, at first from nothing; a gap is the difference to the id before it.
 
 #include <cstdint>
@@ -18,6 +20,7 @@
 #include <string>
 #include <vector>
 
+#include "core/edit.h"
 #include "core/pvs.h"
 #include "core/result.h"
 
@@ -34,6 +37,7 @@ struct RecordedFrame {
   bool everything = false;        ///< every object was visible
   std::uint8_t cause = 0;         ///< ivis_cause: why `wanted` was outside the cell
   std::vector<ObjectId> changed;  ///< ascending; empty when everything
+  std::vector<ObjectState> edits{};  ///< of the scene since the frame before; speeds are not kept
 };
 
 /// `frames[i].changed` is against the frames before: a Recorder writes and RecordedSets reads them.

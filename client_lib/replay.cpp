@@ -57,6 +57,10 @@ Result<ReplayReport> replay(const std::string& endpoint, const client::Record& r
     any = any || wanted(f);
     one_reach = one_reach && (!wanted(f) || f.cell.reach == record.reach);
   }
+  for (const client::RecordedFrame& f : record.frames)
+    if (!f.edits.empty())
+      return input_error(
+          "the record is of a scene that was changed on the way, which cannot be replayed");
   if (!any) return input_error("the record holds no PVS, so there is nothing to replay");
   // Cells of one reach were asked for by name, or are the largest, which serve that. Of several the
   // server chooses again: a metre a second for as many seconds as the reach has metres.

@@ -4,9 +4,11 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "core/edit.h"
 #include "core/ids.h"
 #include "core/pace.h"
 #include "core/result.h"
@@ -54,6 +56,18 @@ struct Answer {
   std::uint32_t count = 0;  ///< of bits set
   double solve_ms = 0;
   double safe = 1;  ///< the part of the pace told that the cell holds for the time asked for
+  std::uint32_t epoch = 0;     ///< of the scene it is of; 0: as in the file
+  std::uint32_t valid_us = 0;  ///< past the sending of the pose; 0: no end
+  /// What has changed: against the scene file if `from_the_file`, else against the answer before.
+  std::vector<ObjectState> changes{};
+  bool from_the_file = true;
+};
+
+/// What became of an edit.
+struct EditResult {
+  std::uint32_t request = 0;
+  std::uint32_t epoch = 0;  ///< 0: refused or lost
+  std::string why;
 };
 
 /// A pose to be answered.
@@ -94,6 +108,16 @@ class PvsSource {
   /// Why none is coming at present, "" when all is well.
   virtual std::string trouble() const = 0;
   virtual SourceStats stats() const = 0;
+
+  /// The newest epoch of the scene that was heard of: a pose is answered for it or a later one.
+  virtual std::uint32_t epoch() const { return 0; }
+  /// Asks for 1 to wire::kMaxEdits valid edits, all or nothing. Returns the number of the request.
+  /// Errors: kUnsupported; kConnection, nothing is asked then.
+  virtual Result<std::uint32_t> edit(std::span<const Edit> /*edits*/) {
+    return unsupported("this client shows a scene that it cannot change");
+  }
+  /// Takes the oldest answer to an edit(), if there is one; receive() brings them in.
+  virtual std::optional<EditResult> edited() { return std::nullopt; }
 };
 
 }  // namespace ivis::client

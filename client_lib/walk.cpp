@@ -70,10 +70,28 @@ Vec3 vec(const double (&p)[3]) {
   return {p[0], p[1], p[2]};
 }
 
+std::vector<ObjectState> changes_of(ivis_client* client) {
+  const ivis_object_state* states = nullptr;
+  std::size_t count = 0;
+  ivis_client_changes(client, &states, &count);
+  std::vector<ObjectState> out;
+  for (std::size_t i = 0; i < count; ++i) {
+    const ivis_object_state& s = states[i];
+    out.push_back({s.id,
+                   s.removed != 0,
+                   s.occluder_off != 0,
+                   s.moved != 0,
+                   {vec(s.position), {s.rotation[3], s.rotation[0], s.rotation[1], s.rotation[2]}},
+                   s.speed_m_s});
+  }
+  return out;
+}
+
 void record_frame(client::Recorder& recorder, const PvsView& view, const Vec3& wanted,
-                  const Reach& reach, double time_s) {
+                  const Reach& reach, double time_s, std::vector<ObjectState> edits) {
   const ivis_frame& raw = view.raw();
   client::RecordedFrame f;
+  f.edits = std::move(edits);
   f.time_s = time_s;
   f.sequence = raw.sequence;
   f.wanted = wanted;
@@ -205,7 +223,8 @@ class Walker {
     before_ = stats;
     if (options_.record_file)
       record_frame(recorder_, view, wanted, record_.reach,
-                   std::chrono::duration<double>(at - *start_).count());
+                   std::chrono::duration<double>(at - *start_).count(), changes_of(client_.get()));
+    epoch_ = raw.epoch;
     return ok();
   }
 
@@ -224,7 +243,9 @@ class Walker {
     if (options_.record_file)
       if (auto written = client::write_record(*options_.record_file, record_); !written)
         return written.error();
-    return summary(samples_, client_.stats(), *client_.info());
+    WalkReport report = summary(samples_, client_.stats(), *client_.info());
+    report.epoch = epoch_;
+    return report;
   }
 
  private:
@@ -234,6 +255,7 @@ class Walker {
   client::Recorder recorder_;
   std::optional<Clock::time_point> start_;  ///< the first frame
   Samples samples_;
+  std::uint32_t epoch_ = 0;
   ivis_stats before_{};
 };
 

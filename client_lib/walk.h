@@ -76,6 +76,7 @@ struct WalkReport {
   /// Frames whose eye was outside the cell, by cause; those that were.
   std::vector<std::pair<std::string, std::uint64_t>> causes;
   std::uint32_t objects = 0;
+  std::uint32_t epoch = 0;  ///< of the scene at the end: 0 when nobody ever changed it
   std::string reach;
   std::string method;
 };

@@ -40,6 +40,37 @@ bool all_opaque(const Mesh& mesh) {
                      [](const Primitive& p) { return p.opaque || p.triangles == 0; });
 }
 
+struct Found {
+  Triangle triangle;
+  double twice;
+};
+
+/// The object's triangles, if all may be ground.
+bool find_flat(const Scene& scene, const Object& object, std::vector<Found>& found) {
+  const Mesh& mesh = scene.mesh_of(object);
+  if (object.always_visible || mesh.triangles() == 0 || !all_opaque(mesh)) return false;
+  found.clear();
+  // A mirroring transform turns the winding round.
+  const double up = glm::determinant(glm::dmat3(object.to_world)) < 0 ? 1 : -1;
+  double twice_sum = 0;
+  for (const Primitive& p : mesh.primitives) {
+    const bool one_side = scene.honour_sidedness && !p.double_sided;
+    for (std::size_t t = p.first_triangle; t < std::size_t{p.first_triangle} + p.triangles; ++t) {
+      Triangle tri = world_triangle(scene, object, t);
+      for (Vec3* c : {&tri.a, &tri.b, &tri.c})
+        *c += 0.0;                                                       // -0 becomes 0
+      if (tri.a == tri.b || tri.b == tri.c || tri.c == tri.a) continue;  // covers nothing
+      const double twice = twice_area(tri.a, tri.b, tri.c);
+      if (steep(tri.a, tri.b, tri.c, twice) || (one_side && twice * up <= 0)) return false;
+      twice_sum += std::abs(twice);
+      found.push_back({tri, twice});
+    }
+  }
+  // What covers more than its own rectangle lies over itself: a closed thing, a tree's crown.
+  const Vec3 size = object.bounds.size();
+  return !(twice_sum > 2 * size.x * size.z * (1 + kAreaTolerance));
+}
+
 class SoupBuilder {
  public:
   SoupBuilder(const Scene& scene, bool occluders_only) : scene_(scene) {
@@ -51,29 +82,7 @@ class SoupBuilder {
 
  private:
   void add(std::uint32_t index) {
-    const Object& object = sources(scene_)[index];
-    const Mesh& mesh = scene_.mesh_of(object);
-    if (object.always_visible || mesh.triangles() == 0 || !all_opaque(mesh)) return;
-    found_.clear();
-    // A mirroring transform turns the winding round.
-    const double up = glm::determinant(glm::dmat3(object.to_world)) < 0 ? 1 : -1;
-    double twice_sum = 0;
-    for (const Primitive& p : mesh.primitives) {
-      const bool one_side = scene_.honour_sidedness && !p.double_sided;
-      for (std::size_t t = p.first_triangle; t < std::size_t{p.first_triangle} + p.triangles; ++t) {
-        Triangle tri = world_triangle(scene_, object, t);
-        for (Vec3* c : {&tri.a, &tri.b, &tri.c})
-          *c += 0.0;                                                       // -0 becomes 0
-        if (tri.a == tri.b || tri.b == tri.c || tri.c == tri.a) continue;  // covers nothing
-        const double twice = twice_area(tri.a, tri.b, tri.c);
-        if (steep(tri.a, tri.b, tri.c, twice) || (one_side && twice * up <= 0)) return;
-        twice_sum += std::abs(twice);
-        found_.push_back({tri, twice});
-      }
-    }
-    // What covers more than its own rectangle lies over itself: a closed thing, a tree's crown.
-    const Vec3 size = object.bounds.size();
-    if (twice_sum > 2 * size.x * size.z * (1 + kAreaTolerance)) return;
+    if (!find_flat(scene_, sources(scene_)[index], found_)) return;
     for (const Found& f : found_) {
       soup_.triangles.push_back({corner(f.triangle.a), corner(f.triangle.b), corner(f.triangle.c)});
       soup_.twice.push_back(f.twice);
@@ -87,10 +96,6 @@ class SoupBuilder {
     return it->second;
   }
 
-  struct Found {
-    Triangle triangle;
-    double twice;
-  };
   const Scene& scene_;
   Soup soup_;
   std::vector<Found> found_;
@@ -128,6 +133,11 @@ class Pieces {
 };
 
 }  // namespace
+
+bool may_be_ground(const Scene& scene, const Object& object) {
+  std::vector<Found> found;
+  return find_flat(scene, object, found) && !found.empty();
+}
 
 Soup ground_soup(const Scene& scene, bool occluders_only) {
   return SoupBuilder(scene, occluders_only).take();

@@ -47,6 +47,9 @@ struct Piece {
 /// reentrant. Cost: linear in triangles.
 Soup ground_soup(const Scene& scene, bool occluders_only);
 
+/// Could the object be part of a ground: would its triangles be in the soup?
+bool may_be_ground(const Scene& scene, const Object& object);
+
 /// The edge-connected pieces, with their sides sorted.
 std::vector<Piece> split(const Soup& soup);
 

@@ -84,4 +84,10 @@ std::string plain_endpoint(std::string endpoint) {
          endpoint.substr(end + 1);
 }
 
+bool is_local(const std::string& endpoint) {
+  for (const char* local : {"ipc://", "tcp://127.", "tcp://localhost:", "tcp://[::1]:"})
+    if (endpoint.starts_with(local)) return true;
+  return false;
+}
+
 }  // namespace ivis::server

@@ -17,4 +17,7 @@ Status claim_address(const std::string& endpoint);
 /// [::ffff:127.0.0.1] is 127.0.0.1, which is also how clients reach it.
 std::string plain_endpoint(std::string endpoint);
 
+/// Can only this machine reach it: an ipc path, or a loopback address as a number or 'localhost'?
+bool is_local(const std::string& endpoint);
+
 }  // namespace ivis::server

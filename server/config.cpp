@@ -131,6 +131,12 @@ Status set_strategy(Config& c, const std::string& text) {
   c.strategy = *strategy;
   return ok();
 }
+Status set_edits(Config& c, const std::string& text) {
+  if (text != "on" && text != "off" && text != "auto")
+    return invalid_argument("found '" + text + "', expected on, off or auto");
+  c.edits = text;
+  return ok();
+}
 Status set_method(Config& c, const std::string& text) {
   c.method = text;
   return ok();
@@ -173,6 +179,11 @@ const std::vector<Key>& keys() {
        Kind::kText,
        get_text(&Config::method),
        set_method},
+      {{"edits", "WHO",
+        "may clients change the scene: on, off, or auto: only where no other machine can connect"},
+       Kind::kText,
+       get_text(&Config::edits),
+       set_edits},
       {{"strategy", "NAME",
         "how solves keep to their time, where a client does not say: guaranteed (all there is), "
         "abort (stop drawing), predictive (choose before drawing); each set is complete"},

@@ -25,10 +25,11 @@ struct Config {
   std::string ladder = "auto";  ///< of smaller reaches: parse_ladder()
   std::string listen = "tcp://127.0.0.1:7447";
   Strategy strategy = Strategy::kGuaranteed;  ///< SessionLimits::strategy
-  unsigned budget_us = 1000;                  ///< SessionLimits::budget_ms
-  std::string method;                         ///< empty: the first of method_list()
-  unsigned threads = 1;                       ///< inside one solve
-  unsigned workers = 0;                       ///< solves at a time; 0: one a core
+  std::string edits = "auto";  ///< may clients change the scene: on, off, or only on this machine
+  unsigned budget_us = 1000;   ///< SessionLimits::budget_ms
+  std::string method;          ///< empty: the first of method_list()
+  unsigned threads = 1;        ///< inside one solve
+  unsigned workers = 0;        ///< solves at a time; 0: one a core
   LogLevel log_level = LogLevel::kInfo;
   bool json_logs = false;
   bool busy_poll = false;

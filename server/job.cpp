@@ -15,6 +15,7 @@ namespace {
 
 Result<Pvs> solve(const Job& job, Work& done) {
   try {
+    if (job.amendment) return job.method->solve(job.cell, job.effort, *job.amendment, done);
     if (job.effort.strategy == Strategy::kGuaranteed) return job.method->solve(job.cell);
     return job.method->solve(job.cell, job.effort, done);
   } catch (const std::exception& e) {  // out of memory costs one answer, not the daemon

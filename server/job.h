@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "scenes/scene.h"
+#include "visibility/amendment.h"
 #include "visibility/method.h"
 #include "wire/messages.h"
 #include "wire/pvs_codec.h"
@@ -33,6 +34,7 @@ struct Job {
   ViewCell cell;
   const Method* method = nullptr;
   Effort effort;
+  std::shared_ptr<const Amendment> amendment;  ///< null: the scene is as in the file
   std::chrono::milliseconds least_solve{0};
   /// The PVS to code against; null: none.
   std::shared_ptr<const wire::PvsState> base;

@@ -32,10 +32,15 @@ Reach scaled(const Reach& reach, double factor) {
 
 }  // namespace
 
-Ladder::Ladder(std::vector<Reach> reaches, const Method& largest, double slack_m)
-    : reaches_(std::move(reaches)), slack_m_(slack_m), methods_(reaches_.size()) {
+Ladder::Ladder(std::vector<Reach> reaches, const Method& largest, double slack_m,
+               const OccluderIndex* index)
+    : reaches_(std::move(reaches)),
+      slack_m_(slack_m),
+      methods_(reaches_.size()),
+      indices_(reaches_.size(), nullptr) {
   IVIS_ASSERT(!reaches_.empty() && reaches_.size() <= wire::kMaxRungs, "rungs of a ladder");
   methods_.back() = &largest;
+  indices_.back() = index;
 }
 
 std::uint32_t Ladder::ready() const {
@@ -46,9 +51,9 @@ std::uint32_t Ladder::ready() const {
 Ladder::Choice Ladder::choose(const Reach& wanted) const {
   for (std::uint32_t i = 0; i < reaches_.size(); ++i)
     if (const Method* m = methods_[i]; m != nullptr && serves(reaches_[i], slack_m_, wanted))
-      return {i, m, 1};
+      return {i, m, indices_[i], 1};
   const auto last = static_cast<std::uint32_t>(reaches_.size() - 1);
-  return {last, methods_[last], safe_part(reaches_[last], wanted)};
+  return {last, methods_[last], indices_[last], safe_part(reaches_[last], wanted)};
 }
 
 double Ladder::safe_part(const Reach& reach, const Reach& wanted) const {
@@ -71,7 +76,7 @@ Reach reach_of(const Pace& pace, std::uint32_t hold_us) {
 
 Ladder::Choice Ladder::choose(const Pace& pace, std::uint32_t hold_us) const {
   if (!pace.told() || hold_us == 0)
-    return {static_cast<std::uint32_t>(reaches_.size() - 1), methods_.back(), 1};
+    return {static_cast<std::uint32_t>(reaches_.size() - 1), methods_.back(), indices_.back(), 1};
   return choose(reach_of(pace, hold_us));
 }
 

@@ -9,6 +9,7 @@
 #include "core/pace.h"
 #include "core/reach.h"
 #include "core/result.h"
+#include "occluders/touched.h"
 #include "visibility/method.h"
 
 namespace ivis::server {
@@ -17,28 +18,35 @@ namespace ivis::server {
 /// once that is ready: the smaller the cell, the smaller the set. The largest is ready from the
 /// start and serves whatever a smaller one would.
 /// Threads:   reaches are fixed; a method may be added in one thread while others look.
-/// Ownership: borrows the methods.
+/// Ownership: borrows the methods and indices.
 class Ladder {
  public:
   struct Choice {
     std::uint32_t rung = 0;
     const Method* method = nullptr;
+    const OccluderIndex* index = nullptr;  ///< of the method's occluders; null: none was given
     double safe = 1;  ///< the part of the declared speeds that the rung's cells hold
   };
 
   /// Ascending, each serving the one before, at most wire::kMaxRungs; `largest` is the method of
   /// the last. `slack_m`: of the occluders.
-  Ladder(std::vector<Reach> reaches, const Method& largest, double slack_m);
+  Ladder(std::vector<Reach> reaches, const Method& largest, double slack_m,
+         const OccluderIndex* index = nullptr);
   /// Of one rung.
-  Ladder(const Reach& reach, const Method& method, double slack_m)
-      : Ladder(std::vector<Reach>{reach}, method, slack_m) {}
+  Ladder(const Reach& reach, const Method& method, double slack_m,
+         const OccluderIndex* index = nullptr)
+      : Ladder(std::vector<Reach>{reach}, method, slack_m, index) {}
 
   const std::vector<Reach>& reaches() const { return reaches_; }
   const Reach& largest() const { return reaches_.back(); }
   double slack_m() const { return slack_m_; }
   const Method& largest_method() const { return *methods_.back(); }
+  const OccluderIndex* largest_index() const { return indices_.back(); }
   /// Not for the largest, and once a rung.
-  void add(std::uint32_t rung, const Method& method) { methods_[rung] = &method; }
+  void add(std::uint32_t rung, const Method& method, const OccluderIndex* index = nullptr) {
+    indices_[rung] = index;  // before the method, which tells others that the rung is there
+    methods_[rung] = &method;
+  }
   std::uint32_t ready() const;
 
   /// The part of `wanted` that cells of `reach` hold, rounded down; 1: all.
@@ -53,6 +61,7 @@ class Ladder {
   std::vector<Reach> reaches_;
   double slack_m_;
   std::vector<std::atomic<const Method*>> methods_;
+  std::vector<const OccluderIndex*> indices_;
 };
 
 /// Where an observer may get to at `pace` while a PVS is in use, `hold_us` past its pose: an

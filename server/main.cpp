@@ -16,6 +16,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "server/address.h"
 #include "server/config.h"
 #include "server/server.h"
 #include "server/world.h"
@@ -195,7 +196,8 @@ int serve(const Config& config) {
   const bool given = !config.occluders.empty() && config.ladder == "auto";
   auto reaches = parse_ladder(given ? "none" : config.ladder, w.reach, w.occluders.slack_m);
   if (!reaches) return report(reaches.error());
-  Ladder ladder(std::move(*reaches), *w.method, w.occluders.slack_m);
+  Ladder ladder(std::move(*reaches), *w.method, w.occluders.slack_m, w.index.get());
+  SceneState state(w.scene);
   const ServedScene served = served_scene(w.scene);
   ServerOptions options;
   options.listen = config.listen;
@@ -203,6 +205,8 @@ int serve(const Config& config) {
   options.workers =
       config.workers > 0 ? config.workers : std::max(1U, std::thread::hardware_concurrency());
   options.limits.max_sessions = config.max_clients;
+  options.limits.edits =
+      config.edits == "on" || (config.edits == "auto" && is_local(config.listen));
   options.limits.idle = std::chrono::seconds(config.idle_timeout_s);
   options.limits.least_solve = std::chrono::milliseconds(config.least_solve_ms);
   options.limits.strategy = config.strategy;
@@ -217,7 +221,7 @@ int serve(const Config& config) {
     log.info("calibrated", {{"fixed_ms", cost.fixed_ms},
                             {"draw_us", 1e3 * cost.draw_ms},
                             {"test_us", 1e3 * cost.test_ms}});
-  auto server = Server::bind(options, served, ladder, log, cost);
+  auto server = Server::bind(options, served, ladder, log, cost, &state);
   if (!server) {
     report(server.error());
     return kConnection;

@@ -44,10 +44,10 @@ Error explain(const zmq::error_t& e, const std::string& listen) {
 
 struct Server::Impl {
   Impl(const ServerOptions& o, const ServedScene& scene, const Ladder& ladder, Log& l,
-       const CostModel& cost)
+       const CostModel& cost, SceneState* state)
       : options(o),
         log(l),
-        sessions(scene, ladder, o.limits, cost),
+        sessions(scene, ladder, o.limits, cost, state),
         workers(scene, std::max(1U, o.workers)),
         context(1),
         socket(context, zmq::socket_type::router) {}
@@ -134,6 +134,8 @@ struct Server::Impl {
       }
     }
     const auto now = std::chrono::steady_clock::now();
+    for (const Outgoing& notice : sessions.notices(now))
+      send(notice);
     if (now >= next_housekeeping) {
       next_housekeeping = now + kHousekeeping;
       if (const auto gone = sessions.expire(now); gone != 0)
@@ -163,11 +165,11 @@ const SessionCounters& Server::counters() const {
 }
 
 Result<std::unique_ptr<Server>> Server::bind(const ServerOptions& options, const ServedScene& scene,
-                                             const Ladder& ladder, Log& log,
-                                             const CostModel& cost) {
+                                             const Ladder& ladder, Log& log, const CostModel& cost,
+                                             SceneState* state) {
   if (auto claimed = claim_address(options.listen); !claimed) return claimed.error();
   try {
-    auto impl = std::make_unique<Impl>(options, scene, ladder, log, cost);
+    auto impl = std::make_unique<Impl>(options, scene, ladder, log, cost, state);
     impl->configure();
     impl->socket.bind(options.listen);
     impl->endpoint = plain_endpoint(impl->socket.get(zmq::sockopt::last_endpoint));
@@ -219,6 +221,8 @@ void Server::run(const std::atomic<bool>& stop) {
                         {"superseded", c.superseded},
                         {"beyond_ladder", c.beyond_ladder},
                         {"cut_short", c.cut_short},
+                        {"edits", c.edits},
+                        {"edits_refused", c.edits_refused},
                         {"refused", c.refused},
                         {"malformed", c.malformed},
                         {"dropped", s.dropped},

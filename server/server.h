@@ -32,7 +32,8 @@ class Server {
   /// taken over.
   static Result<std::unique_ptr<Server>> bind(const ServerOptions& options,
                                               const ServedScene& scene, const Ladder& ladder,
-                                              Log& log, const CostModel& cost = {});
+                                              Log& log, const CostModel& cost = {},
+                                              SceneState* state = nullptr);
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

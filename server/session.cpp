@@ -12,6 +12,13 @@ namespace {
 /// A PVS is taken to be in use at least for so long, lest a client that claims less be always
 /// first.
 constexpr auto kLeastHold = std::chrono::milliseconds(2);
+/// A client that has said nothing for so long may be waiting.
+constexpr auto kIdle = std::chrono::milliseconds(60);
+/// A PVS of a scene in which something moves by itself is valid for so much longer than a client
+/// says it uses one for, within the bounds that follow.
+constexpr int kHolds = 3;
+constexpr auto kShortestValid = std::chrono::milliseconds(100);
+constexpr auto kLongestValid = std::chrono::milliseconds(1000);
 /// Answers that SessionTable::passed_over_ looks back on.
 constexpr double kLookBack = 256;
 
@@ -45,8 +52,13 @@ std::string why_another(const ServedScene& scene, SceneHash hash) {
 }  // namespace
 
 SessionTable::SessionTable(const ServedScene& scene, const Ladder& ladder, SessionLimits limits,
-                           const CostModel& cost)
-    : scene_(scene), ladder_(ladder), limits_(limits), cost_(cost), ids_(seeded()) {}
+                           const CostModel& cost, SceneState* state)
+    : scene_(scene),
+      ladder_(ladder),
+      limits_(limits),
+      cost_(cost),
+      state_(state),
+      ids_(seeded()) {}
 
 std::optional<Outgoing> SessionTable::receive(std::string_view peer,
                                               std::span<const std::byte> bytes, Time now) {
@@ -58,6 +70,7 @@ std::optional<Outgoing> SessionTable::receive(std::string_view peer,
   if (const auto* pose = std::get_if<wire::PoseMessage>(&*message)) return handle(peer, *pose, now);
   if (const auto* hello = std::get_if<wire::Hello>(&*message)) return handle(peer, *hello, now);
   if (const auto* pace = std::get_if<wire::PaceMessage>(&*message)) return handle(peer, *pace, now);
+  if (const auto* edit = std::get_if<wire::EditMessage>(&*message)) return handle(peer, *edit, now);
   if (const auto* bye = std::get_if<wire::Bye>(&*message)) return handle(peer, *bye);
   ++counters_.malformed;
   return refuse(peer, 0, wire::Refusal::kMalformed, "a message that only a server sends");
@@ -144,6 +157,46 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
   return std::nullopt;
 }
 
+std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::EditMessage& edit,
+                                             Time now) {
+  Session* const session = find(peer, edit.session);
+  if (session == nullptr) return refuse_unknown(peer, edit.session);
+  session->heard = now;
+  SceneState::Outcome outcome;
+  if (!limits_.edits)
+    outcome.why = "this server takes no edits (ivisd --edits on)";
+  else if (state_ == nullptr || ladder_.largest_index() == nullptr ||
+           !ladder_.largest_method().takes_amendments())
+    outcome.why = "the method " + ladder_.largest_method().traits().name + " takes no edits";
+  else
+    outcome = state_->apply(edit.edits, now);
+  if (outcome.epoch != 0)
+    counters_.edits += edit.edits.size();
+  else
+    ++counters_.edits_refused;
+  return Outgoing{std::string(peer), wire::encode(wire::EditedMessage{edit.session, edit.request,
+                                                                      outcome.epoch, outcome.why})};
+}
+
+std::vector<Outgoing> SessionTable::notices(Time now) {
+  std::vector<Outgoing> out;
+  if (state_ == nullptr || noticed_epoch_ == state_->epoch()) return out;
+  const std::uint32_t epoch = state_->epoch();
+  bool all = true;
+  for (auto& [peer, session] : sessions_) {
+    if (session.told_epoch == epoch || session.welcome_due) continue;
+    // Who asks all the time is told with the next answer.
+    if (session.pose || session.under_way || now - session.posed < kIdle) {
+      all = false;
+      continue;
+    }
+    session.told_epoch = epoch;
+    out.push_back({peer, wire::encode(wire::NoticeMessage{session.id, epoch})});
+  }
+  if (all) noticed_epoch_ = epoch;
+  return out;
+}
+
 std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::Bye& bye) {
   if (find(peer, bye.session) != nullptr) forget(peer);
   return std::nullopt;
@@ -193,7 +246,7 @@ SessionTable::Next SessionTable::next(Time now) {
   Session& session = peer.second;
   waiting_.erase(first);
   session.waiting = false;
-  if (!session.welcome_due) return answer(peer);
+  if (!session.welcome_due) return answer(peer, now);
   std::vector<std::byte> bytes = welcome(session);
   if (session.pose) enqueue(peer);
   return Outgoing{peer.first, std::move(bytes)};
@@ -243,13 +296,13 @@ std::vector<std::byte> SessionTable::welcome(Session& session) {
 Ladder::Choice SessionTable::choose(const Session& session, std::uint32_t hold_us) const {
   // A named reach always by the same occluders: equal poses get equal sets.
   if (session.reach)
-    return {0, &ladder_.largest_method(),
+    return {0, &ladder_.largest_method(), ladder_.largest_index(),
             session.pace.told() ? ladder_.safe_part(*session.reach, reach_of(session.pace, hold_us))
                                 : 1};
   return ladder_.choose(session.pace, hold_us);
 }
 
-Job SessionTable::answer(Peers::value_type& peer) {
+Job SessionTable::answer(Peers::value_type& peer, Time now) {
   Session& session = peer.second;
   const wire::PoseMessage pose = *session.pose;
   session.pose.reset();
@@ -272,6 +325,10 @@ Job SessionTable::answer(Peers::value_type& peer) {
   job.message.sequence = pose.sequence;
   job.message.rung = static_cast<std::uint16_t>(choice.rung);
   job.message.safe = static_cast<std::uint16_t>(choice.safe * wire::PvsMessage::kAllSafe);
+  if (state_ != nullptr && state_->epoch() != 0) {
+    add_changes(choice, pose, now, job);
+    session.told_epoch = state_->epoch();
+  }
   const auto base = std::find_if(session.sent.begin(), session.sent.end(),
                                  [&](const Remembered& r) { return r.sequence == pose.have_pvs; });
   if (pose.have_pvs != 0 && base != session.sent.end()) {
@@ -282,6 +339,25 @@ Job SessionTable::answer(Peers::value_type& peer) {
     job.base = session.sent.front().state;
   }
   return job;
+}
+
+// The pose was sent before `now`, so what is valid until now + valid is so for as long past its
+// sending.
+void SessionTable::add_changes(const Ladder::Choice& choice, const wire::PoseMessage& pose,
+                               Time now, Job& job) const {
+  wire::SceneChanges& changes = job.message.changes;
+  changes.epoch = state_->epoch();
+  changes.since = pose.epoch <= changes.epoch ? pose.epoch : 0;
+  changes.objects = state_->since(changes.since);
+  Time until = now;
+  if (state_->moves()) {
+    const auto valid = std::clamp<std::chrono::microseconds>(
+        std::chrono::microseconds(std::uint64_t{kHolds} * pose.hold_us), kShortestValid,
+        kLongestValid);
+    changes.valid_us = static_cast<std::uint32_t>(valid.count());
+    until += valid;
+  }
+  job.amendment = state_->amendment(*choice.index, now, until);
 }
 
 std::size_t SessionTable::remembered_limit() const {

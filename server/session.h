@@ -20,6 +20,7 @@
 #include "server/cost_model.h"
 #include "server/job.h"
 #include "server/ladder.h"
+#include "server/scene_state.h"
 #include "wire/messages.h"
 
 namespace ivis::server {
@@ -31,6 +32,7 @@ struct SessionLimits {
   double budget_ms = 1;                      ///< of one solve
   std::chrono::milliseconds idle{60'000};    ///< silence after which a session is over
   std::chrono::milliseconds least_solve{0};  ///< a solve takes no less: to try out a slow server
+  bool edits = true;                         ///< may clients change the scene?
   std::size_t remembered_sets = 32;          ///< PVS a session that may become a base
   std::size_t remembered_bytes = 4U << 20U;  ///< of them; at least two are kept whatever their size
 };
@@ -46,6 +48,8 @@ struct SessionCounters {
   std::uint64_t full_sets = 0;
   std::uint64_t solve_errors = 0;
   std::uint64_t cut_short = 0;      ///< answers that left something undrawn or untested
+  std::uint64_t edits = 0;          ///< done, of how many messages ever
+  std::uint64_t edits_refused = 0;  ///< messages
   std::uint64_t beyond_ladder = 0;  ///< answers whose cell holds less than the speeds told
   std::uint64_t bytes_out = 0;      ///< of answers
 };
@@ -72,8 +76,9 @@ class SessionTable {
 
   /// The ladder's largest reach is the largest one that may be asked for.
   /// `cost`: what makes budgets of milliseconds ones of work; not asked for kGuaranteed.
+  /// `state`: of the scene, for edits; null: there are none.
   SessionTable(const ServedScene& scene, const Ladder& ladder, SessionLimits limits,
-               const CostModel& cost = {});
+               const CostModel& cost = {}, SceneState* state = nullptr);
 
   /// Takes one message of `peer`; never fails: what is wrong comes back as a Refused to send.
   std::optional<Outgoing> receive(std::string_view peer, std::span<const std::byte> bytes,
@@ -88,6 +93,9 @@ class SessionTable {
   std::optional<Outgoing> finish(JobDone done);
   /// next(), performed here and finished.
   std::optional<Outgoing> work(Time now);
+
+  /// Tells those that ask nothing at present of what has changed since they were told last.
+  std::vector<Outgoing> notices(Time now);
 
   /// The transport says that this peer is gone.
   void forget(std::string_view peer);
@@ -118,6 +126,7 @@ class SessionTable {
     bool waiting = false;             ///< is in waiting_
     std::uint32_t passed_over = 0;    ///< poses since the last that was answered
     std::uint32_t last_sequence = 0;  ///< of poses received
+    std::uint32_t told_epoch = 0;     ///< of the newest job or notice
     std::uint32_t acknowledged = 0;   ///< sequence of the PVS the client holds
     std::optional<wire::PoseMessage> pose;
     Time posed{};                 ///< when that pose came
@@ -129,6 +138,7 @@ class SessionTable {
   std::optional<Outgoing> handle(std::string_view peer, const wire::Hello& hello, Time now);
   std::optional<Outgoing> handle(std::string_view peer, const wire::PoseMessage& pose, Time now);
   std::optional<Outgoing> handle(std::string_view peer, const wire::PaceMessage& pace, Time now);
+  std::optional<Outgoing> handle(std::string_view peer, const wire::EditMessage& edit, Time now);
   std::optional<Outgoing> handle(std::string_view peer, const wire::Bye& bye);
   /// The peer's session if it is the one named, else null.
   Session* find(std::string_view peer, std::uint64_t id);
@@ -136,7 +146,9 @@ class SessionTable {
   Outgoing refuse(std::string_view peer, std::uint64_t session, wire::Refusal reason,
                   std::string text);
   std::vector<std::byte> welcome(Session& session);
-  Job answer(Peers::value_type& peer);
+  Job answer(Peers::value_type& peer, Time now);
+  void add_changes(const Ladder::Choice& choice, const wire::PoseMessage& pose, Time now,
+                   Job& job) const;
   Ladder::Choice choose(const Session& session, std::uint32_t hold_us) const;
   void remember(Session& session, std::uint32_t sequence,
                 std::shared_ptr<const wire::PvsState> state);
@@ -150,6 +162,8 @@ class SessionTable {
   const Ladder& ladder_;
   SessionLimits limits_;
   CostModel cost_;
+  SceneState* state_;
+  std::uint32_t noticed_epoch_ = 0;  ///< all have been told of
   SessionCounters counters_;
   Peers sessions_;
   std::vector<Peers::value_type*> waiting_;  ///< with something to be done, in any order

@@ -71,6 +71,7 @@ Result<std::unique_ptr<World>> load_world(const WorldOptions& options, const Con
   auto made = make(method, world->scene, world->occluders, options);
   if (!made) return made.error();
   world->method = std::move(*made);
+  world->index = std::make_unique<OccluderIndex>(world->occluders);
   return world;
 }
 
@@ -85,8 +86,10 @@ Status build_rungs(World& world, Ladder& ladder, const WorldOptions& options,
     auto made = make(method, world.scene, rung->occluders, options);
     if (!made) return made.error();
     rung->method = std::move(*made);
+    rung->index = std::make_unique<OccluderIndex>(rung->occluders);
     world.rungs.push_back(std::move(rung));
-    ladder.add(static_cast<std::uint32_t>(i), *world.rungs.back()->method);
+    ladder.add(static_cast<std::uint32_t>(i), *world.rungs.back()->method,
+               world.rungs.back()->index.get());
   }
   return ok();
 }

@@ -21,10 +21,12 @@ struct World {
   OccluderSet occluders;
   Reach reach;  ///< of a cell, when nobody wants another
   std::unique_ptr<Method> method;
+  std::unique_ptr<OccluderIndex> index;
   /// For smaller reaches, by build_rungs().
   struct Rung {
     OccluderSet occluders;
     std::unique_ptr<Method> method;
+    std::unique_ptr<OccluderIndex> index;
   };
   std::vector<std::unique_ptr<Rung>> rungs;
 

@@ -189,10 +189,10 @@ void SolveArgs::add_to(CLI::App& app, bool reach_required) {
   app.add_option("--map", map, "sampling of the cull map")
       ->capture_default_str()
       ->check(CLI::IsMember({"polar", "orthographic"}));
-  app.add_option(
-         "--backend", backend,
-         "what draws the occlusion map, or the orthographic cull map; auto: OpenGL where hardware does "
-         "it, else the CPU")
+  app.add_option("--backend", backend,
+                 "what draws the occlusion map, or the orthographic cull map; auto: OpenGL where "
+                 "hardware does "
+                 "it, else the CPU")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "cpu", "gl"}));
   app.add_option("--occluders", occluders,

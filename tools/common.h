@@ -132,6 +132,7 @@ void add_pvs(CLI::App& app, std::function<Outcome()>& action);
 void add_verify(CLI::App& app, std::function<Outcome()>& action);
 void add_draw(CLI::App& app, std::function<Outcome()>& action);
 void add_walk(CLI::App& app, std::function<Outcome()>& action);
+void add_edit(CLI::App& app, std::function<Outcome()>& action);
 void add_replay(CLI::App& app, std::function<Outcome()>& action);
 void add_generate(CLI::App& app, std::function<Outcome()>& action);
 

@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
   add_draw(app, action);
   add_walk(app, action);
   add_replay(app, action);
+  add_edit(app, action);
   add_generate(app, action);
   try {
     app.parse(argc, argv);

@@ -1,10 +1,13 @@
 #include "visibility/verify.h"
 
+#include <algorithm>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <tuple>
 
 #include "client_lib/record.h"
+#include "scenes/edited.h"
 #include "tools/common.h"
 
 namespace ivis::tool {
@@ -107,6 +110,43 @@ Outcome verify_path(const VerifyArgs& args, const Context& context) {
   return summary.report(args.json);
 }
 
+/// The verifier of the scene as each frame of a record showed it, first to last.
+class SceneInUse {
+ public:
+  SceneInUse(const Scene& scene, const client::Record& record, const OccluderSet& occluders,
+             const VerifyArgs& args)
+      : scene_(scene), record_(record), occluders_(occluders), args_(args) {}
+  const Verifier& at(std::size_t frame) {
+    for (; next_ <= frame; ++next_)
+      for (const ObjectState& s : record_.frames[next_].edits) {
+        verifier_.reset();
+        if (s.as_in_the_file())
+          states_.erase(s.id);
+        else
+          states_[s.id] = s;
+      }
+    if (!verifier_) {
+      // An occluder that is off may be anything, an open door too: rays pass what is tagged so.
+      const bool off =
+          std::ranges::any_of(states_, [](const auto& s) { return s.second.occluder_off; });
+      edited_ = edited(scene_, states_);
+      verifier_ = std::make_unique<Verifier>(edited_, &occluders_,
+                                             off ? BlockerChoice::kOccluding : blockers(args_));
+    }
+    return *verifier_;
+  }
+
+ private:
+  const Scene& scene_;
+  const client::Record& record_;
+  const OccluderSet& occluders_;
+  const VerifyArgs& args_;
+  std::size_t next_ = 0;
+  std::map<ObjectId, ObjectState> states_;
+  Scene edited_;
+  std::unique_ptr<Verifier> verifier_;
+};
+
 /// A covered frame was promised for its whole cell, an uncovered one was drawn from its eye alone.
 Outcome verify_record(const VerifyArgs& args, const Context& context) {
   const auto record = client::read_record(args.record);
@@ -127,9 +167,9 @@ Outcome verify_record(const VerifyArgs& args, const Context& context) {
                        "' holds no frame, so there is nothing to verify");
   const auto occluders = args.solve.get_occluders(*scene, record->reach, context);
   if (!occluders) return occluders.error();
-  const Verifier verifier(*scene, &*occluders, blockers(args));
   Summary summary;
   client::RecordedSets sets(*record);
+  SceneInUse in_use(*scene, *record, *occluders, args);
   std::tuple<std::uint32_t, bool, bool> last;
   for (std::size_t row = 0; row < record->frames.size(); row += args.stride) {
     // The same PVS, promised for the same cell, is checked once.
@@ -139,7 +179,7 @@ Outcome verify_record(const VerifyArgs& args, const Context& context) {
     last = promise;
     Pvs pvs = sets.at(row);
     if (!record->frames[row].covered) pvs.cell = {record->frames[row].eye, Reach::ball(0)};
-    const auto report = verifier.check(pvs, verify_options(args), without_progress(context));
+    const auto report = in_use.at(row).check(pvs, verify_options(args), without_progress(context));
     if (!report) return report.error();
     summary.add(*report);
     context.report("verify", std::min(row + args.stride, record->frames.size()),

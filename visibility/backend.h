@@ -14,7 +14,8 @@ Result<std::unique_ptr<Method>> make_occlusion_map(const Scene& scene, const Occ
                                                    const MethodOptions& options);
 
 /// The cull map; of the orthographic one the shadows are drawn on what options.backend asks for, in
-/// the same way. Errors: kInvalidArgument if Backend::kGl is asked for the polar map; else as above.
+/// the same way. Errors: kInvalidArgument if Backend::kGl is asked for the polar map; else as
+/// above.
 Result<std::unique_ptr<Method>> make_cull_map(const Scene& scene, const OccluderSet& occluders,
                                               const MethodOptions& options);
 

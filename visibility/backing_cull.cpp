@@ -34,7 +34,8 @@ class BackingCull final : public CulledMethod {
   }
 
  private:
-  void cull(const ViewCell& cell, std::vector<ObjectId>& objects) const override {
+  void cull(const ViewCell& cell, const Amendment* amendment,
+            std::vector<ObjectId>& objects) const override {
     const Reach reach = padded(cell.reach, slack_m_);
     const Vec3 move = reach.half_extents();
     constexpr std::size_t kAhead = 12;  // memory takes longer than the arithmetic
@@ -46,7 +47,8 @@ class BackingCull final : public CulledMethod {
         __builtin_prefetch(next + 64);
       }
       const std::uint32_t record = record_[objects[i]];
-      if (record == 0 || !hidden(backed_[record], cell.eye, reach, move))
+      if (record == 0 || !hidden(backed_[record], cell.eye, reach, move) ||
+          (amendment != nullptr && !still_backed(*amendment, objects[i], backed_[record])))
         objects[kept++] = objects[i];
     }
     objects.resize(kept);
@@ -68,6 +70,11 @@ class BackingCull final : public CulledMethod {
     for (std::uint32_t k = 0; k < object.more; ++k)
       if (!hides(others_[object.first + k], eye, reach, far)) return false;
     return true;
+  }
+  /// It is where it was, and so is what backs it.
+  static bool still_backed(const Amendment& amendment, ObjectId id, const Backed& object) {
+    return !amendment.is_gone(id) &&
+           (!amendment.occluders || !near_displaced(*amendment.occluders, object.box));
   }
   static double behind(const Backing& b, const Vec3& eye, const Reach& reach) {
     return b.plane.offset - glm::dot(b.plane.normal, eye) - reach.support(b.plane.normal);

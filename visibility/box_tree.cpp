@@ -29,6 +29,17 @@ float up(double v) {
   return f < v ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
 }
 
+void set_child(BoxTree::Node& node, std::size_t g, const Aabb& box, const Vec3& origin,
+               std::uint32_t child) {
+  node.lo_x[g] = down(box.lo.x - origin.x);
+  node.hi_x[g] = up(box.hi.x - origin.x);
+  node.lo_z[g] = down(box.lo.z - origin.z);
+  node.hi_z[g] = up(box.hi.z - origin.z);
+  node.lo_y[g] = down(box.lo.y - origin.y);
+  node.hi_y[g] = up(box.hi.y - origin.y);
+  node.child[g] = child;
+}
+
 class Builder {
  public:
   Builder(std::vector<Entry>& entries, BoxTree& tree) : entries_(entries), tree_(tree) {}
@@ -54,14 +65,7 @@ class Builder {
       } else {
         box = {Vec3{0}, Vec3{0}};
       }
-      BoxTree::Node& node = tree_.nodes[index];
-      node.lo_x[g] = down(box.lo.x - tree_.origin.x);
-      node.hi_x[g] = up(box.hi.x - tree_.origin.x);
-      node.lo_z[g] = down(box.lo.z - tree_.origin.z);
-      node.hi_z[g] = up(box.hi.z - tree_.origin.z);
-      node.lo_y[g] = down(box.lo.y - tree_.origin.y);
-      node.hi_y[g] = up(box.hi.y - tree_.origin.y);
-      node.child[g] = child;
+      set_child(tree_.nodes[index], g, box, tree_.origin, child);
     }
     tree_.nodes[index].count = static_cast<std::uint32_t>(groups.size());
     return index;
@@ -131,6 +135,44 @@ BoxTree BoxTree::build(std::span<const Aabb> boxes, std::span<const std::uint32_
   for (std::size_t i = 0; i < boxes.size(); ++i)
     entries.push_back({boxes[i], boxes[i].centre(), items[i]});
   Builder(entries, tree).build(0, entries.size());
+  return tree;
+}
+
+namespace {
+
+/// Appends nodes over boxes[first, last); returns the index of their root.
+std::uint32_t pack_nodes(std::span<const Aabb> boxes, std::span<const std::uint32_t> items,
+                         BoxTree& tree, Aabb& all) {
+  std::size_t capacity = 1;
+  while (capacity * BoxTree::kWidth < boxes.size())
+    capacity *= BoxTree::kWidth;
+  const auto index = static_cast<std::uint32_t>(tree.nodes.size());
+  tree.nodes.emplace_back();
+  std::uint32_t count = 0;
+  for (std::size_t first = 0; first < boxes.size(); first += capacity, ++count) {
+    const std::size_t n = std::min(capacity, boxes.size() - first);
+    Aabb box = boxes[first];
+    const std::uint32_t child =
+        capacity == 1 ? BoxTree::kItem | items[first]
+                      : pack_nodes(boxes.subspan(first, n), items.subspan(first, n), tree, box);
+    set_child(tree.nodes[index], count, box, tree.origin, child);
+    all.add(box);
+  }
+  for (std::size_t g = count; g < BoxTree::kWidth; ++g)
+    set_child(tree.nodes[index], g, {Vec3{0}, Vec3{0}}, tree.origin, 0);
+  tree.nodes[index].count = count;
+  return index;
+}
+
+}  // namespace
+
+BoxTree BoxTree::pack(std::span<const Aabb> boxes, std::span<const std::uint32_t> items,
+                      const Vec3& tree_origin) {
+  IVIS_ASSERT(boxes.size() == items.size() && boxes.size() < kItem, "one name a box");
+  BoxTree tree;
+  tree.origin = tree_origin;
+  Aabb all;
+  if (!boxes.empty()) pack_nodes(boxes, items, tree, all);
   return tree;
 }
 

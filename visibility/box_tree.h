@@ -28,6 +28,9 @@ struct BoxTree {
   /// `items[i]` names box `boxes[i]`. Cost: O(n log² n). Relative to `tree_origin`.
   static BoxTree build(std::span<const Aabb> boxes, std::span<const std::uint32_t> items,
                        const Vec3& tree_origin);
+  /// The same, sixteen neighbours in the order given to a node. Cost: O(n), some nanoseconds a box.
+  static BoxTree pack(std::span<const Aabb> boxes, std::span<const std::uint32_t> items,
+                      const Vec3& tree_origin);
 };
 
 }  // namespace ivis

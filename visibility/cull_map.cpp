@@ -24,11 +24,15 @@ bool eye_fits_single_precision(const Vec3& eye, double slack_m) {
   return true;
 }
 
-WallSet make_walls(const OccluderSet& occluders, const Vec3& origin) {
+/// `of_prism`: receives the solid that each prism became, or kNoSolid.
+constexpr std::uint32_t kNoSolid = 0xffffffffU;
+WallSet make_walls(const std::vector<Prism>& prisms, double floor, const Vec3& origin,
+                   std::vector<std::uint32_t>* of_prism = nullptr) {
   WallSet walls;
   std::vector<Aabb> boxes;
   std::vector<std::uint32_t> items;
-  for (const Prism& prism : occluders.shrunk) {
+  for (const Prism& prism : prisms) {
+    if (of_prism != nullptr) of_prism->push_back(kNoSolid);
     WallSet::Solid solid;
     solid.first_ring = static_cast<std::uint32_t>(walls.rings.size());
     for (const auto& ring : prism.footprint.rings) {
@@ -44,10 +48,11 @@ WallSet make_walls(const OccluderSet& occluders, const Vec3& origin) {
     if (solid.rings == 0) continue;
     solid.top = static_cast<float>(prism.top - origin.y);
     solid.bottom = static_cast<float>(prism.bottom - origin.y);
-    solid.floored = prism.solid_bottom <= occluders.floor;
+    solid.floored = prism.solid_bottom <= floor;
     solid.grounded = prism.grounded;
     boxes.push_back(prism.bounds());
     items.push_back(static_cast<std::uint32_t>(walls.solids.size()));
+    if (of_prism != nullptr) of_prism->back() = items.back();
     walls.solids.push_back(solid);
   }
   walls.x.resize(walls.x.size() + BoxTree::kWidth);
@@ -75,7 +80,16 @@ struct CullMap::Scratch {
   std::vector<std::uint8_t> wanted;  ///< of solids; empty: all
   std::vector<std::uint32_t> visible;
   std::vector<std::uint64_t> bits;
+  std::shared_ptr<const WallSet> added;
 };
+
+namespace {
+
+bool reaches_down(const WallSet::Solid& s, const Floors& floors) {
+  return (s.floored && floors.above_floor) || (s.grounded && floors.on_ground);
+}
+
+}  // namespace
 
 CullMap::CullMap(const Scene& scene, const OccluderSet& occluders, const MethodOptions& options,
                  const PolarGuards& guards, std::uint32_t bins_a_face)
@@ -85,7 +99,7 @@ CullMap::CullMap(const Scene& scene, const OccluderSet& occluders, const MethodO
       guards_(guards),
       bins_a_face_(bins_a_face),
       origin_(scene.bounds.empty() ? Vec3{0} : scene.bounds.centre()),
-      walls_(make_walls(occluders, origin_)),
+      walls_(make_walls(occluders.shrunk, occluders.floor, origin_, &solid_of_)),
       solids_(occluders) {
   std::vector<Aabb> boxes;
   std::vector<std::uint32_t> ids;
@@ -99,6 +113,10 @@ CullMap::CullMap(const Scene& scene, const OccluderSet& occluders, const MethodO
     }
   }
   objects_ = BoxTree::build(boxes, ids, origin_);
+  if (!scene.bounds.empty()) {
+    const Vec3 half = scene.bounds.size() * 0.5;
+    extent_m_ = std::max({half.x, half.y, half.z});
+  }
   for (const WallSet::Solid& s : walls_.solids) {
     std::uint32_t corners = 0;
     for (std::uint32_t r = 0; r < s.rings; ++r)
@@ -150,25 +168,36 @@ void CullMap::give_back(std::unique_ptr<Scratch> scratch) const {
 
 Result<Pvs> CullMap::solve(const ViewCell& cell) const {
   Stats stats;
-  return solve(cell, nullptr, {}, stats);
+  return solve(cell, nullptr, {}, nullptr, stats);
 }
 
 Result<Pvs> CullMap::solve(const ViewCell& cell, LastShown& last) const {
   Stats stats;
-  return solve(cell, &last, {}, stats);
+  return solve(cell, &last, {}, nullptr, stats);
 }
 
 Result<Pvs> CullMap::solve(const ViewCell& cell, const Effort& effort, Work& done) const {
   Stats stats;
   Effort bounded = effort;
   if (effort.strategy == Strategy::kGuaranteed) bounded.draw = bounded.test = Effort::kUnbounded;
-  auto pvs = solve(cell, nullptr, bounded, stats);
+  auto pvs = solve(cell, nullptr, bounded, nullptr, stats);
+  done = {stats.polar.draw_work(), stats.polar.nodes_tested, stats.polar.cut};
+  return pvs;
+}
+
+Result<Pvs> CullMap::solve(const ViewCell& cell, const Effort& effort, const Amendment& amendment,
+                           Work& done) const {
+  if (orthographic_) return Method::solve(cell, effort, amendment, done);
+  Stats stats;
+  Effort bounded = effort;
+  if (effort.strategy == Strategy::kGuaranteed) bounded.draw = bounded.test = Effort::kUnbounded;
+  auto pvs = solve(cell, nullptr, bounded, &amendment, stats);
   done = {stats.polar.draw_work(), stats.polar.nodes_tested, stats.polar.cut};
   return pvs;
 }
 
 Result<Pvs> CullMap::solve(const ViewCell& cell, Stats& stats) const {
-  return solve(cell, nullptr, {}, stats);
+  return solve(cell, nullptr, {}, nullptr, stats);
 }
 
 // A solid is painted at most once; each wall faces the eye or away, and is drawn at most once of
@@ -182,7 +211,7 @@ Work CullMap::most_work() const {
 }
 
 Result<Pvs> CullMap::solve(const ViewCell& cell, LastShown* last, const Effort& effort,
-                           Stats& stats) const {
+                           const Amendment* amendment, Stats& stats) const {
   if (auto checked = check_cell(cell, occluders_); !checked) return checked.error();
   Pvs pvs = empty_answer(scene_, cell);
   const Vec3 half = padded(cell.reach, occluders_.slack_m).half_extents();
@@ -191,7 +220,13 @@ Result<Pvs> CullMap::solve(const ViewCell& cell, LastShown* last, const Effort& 
   for (int i = 0; i < 3; ++i)
     eye.single[i] = static_cast<float>(eye.apex[i]);
   const char* why = nullptr;
-  if (solids_.holds(cell.eye)) {
+  const OccluderChange* change =
+      amendment != nullptr && amendment->occluders ? amendment->occluders.get() : nullptr;
+  const bool in_added =
+      change != nullptr && std::ranges::any_of(change->added_solids, [&](const Aabb& box) {
+        return box.contains(cell.eye);
+      });
+  if (in_added || solids_.holds(cell.eye)) {
     why = "eye inside an occluder";
   } else if (!eye_fits_single_precision(eye.apex, occluders_.slack_m)) {
     why = "eye too far from the scene for single precision";
@@ -209,29 +244,49 @@ Result<Pvs> CullMap::solve(const ViewCell& cell, LastShown* last, const Effort& 
                     (eye.floors.on_ground && all_grounded_) ||
                     (eye.floors.above_floor && eye.floors.on_ground && all_held_down_);
   eye.floors.undersides = !down;
-  stats.undersides = down ? 0 : 1;
+  if (const auto added = added_walls(amendment))
+    for (const WallSet::Solid& s : added->solids)
+      if (!reaches_down(s, eye.floors)) eye.floors.undersides = true;
+  stats.undersides = eye.floors.undersides ? 1 : 0;
 
   auto scratch = take_scratch();
   scratch->visible.clear();
-  if (auto drawn = draw_selected(eye, last, effort, *scratch, stats); !drawn) return drawn.error();
+  if (auto drawn = draw_selected(eye, last, effort, amendment, *scratch, stats); !drawn)
+    return drawn.error();
   find_objects(eye, effort, *scratch, stats);
+  const std::vector<ObjectId>* always = &always_visible_;
+  std::vector<ObjectId> still_there;
+  if (amendment != nullptr) {
+    std::erase_if(scratch->visible, [&](ObjectId id) { return amendment->is_gone(id); });
+    for (const ObjectId id : always_visible_)
+      if (!amendment->is_gone(id)) still_there.push_back(id);
+    always = &still_there;
+    find_placed(eye, *amendment, *scratch, stats);
+  }
   // Where much is left untested the list would take longer than what it is worth.
   if (stats.polar.untested > scene_.objects.size() / 4) {
     list_everything(scene_, "the budget allows for no less", pvs);
     give_back(std::move(scratch));
     return pvs;
   }
-  list_ascending(scene_.objects.size(), scratch->visible, always_visible_, scratch->bits, pvs);
+  list_ascending(scene_.objects.size(), scratch->visible, *always, scratch->bits, pvs);
   give_back(std::move(scratch));
   return pvs;
 }
 
 /// What MethodOptions::selection says. Drawing less is always safe.
 Status CullMap::draw_selected(const Eye& eye, LastShown* last, const Effort& effort,
-                              Scratch& scratch, Stats& stats) const {
+                              const Amendment* amendment, Scratch& scratch, Stats& stats) const {
   scratch.wanted.clear();
+  scratch.added = added_walls(amendment);
   if (effort.strategy == Strategy::kPredictive && !orthographic_)
     mark_promising(eye, effort, scratch, stats);
+  if (amendment != nullptr && amendment->occluders && !amendment->occluders->shrunk_off.empty()) {
+    if (scratch.wanted.empty()) scratch.wanted.assign(walls_.solids.size(), 1);
+    const std::vector<std::uint8_t>& off = amendment->occluders->shrunk_off;
+    for (std::size_t p = 0; p < off.size(); ++p)
+      if (off[p] != 0 && solid_of_[p] != kNoSolid) scratch.wanted[solid_of_[p]] = 0;
+  }
   if (last == nullptr || options_.selection == Selection::kConservative)
     return draw(eye, largest_solids(eye, nullptr), effort, scratch, stats);
   auto drawn = draw(eye, largest_solids(eye, last->known ? &last->occluders : nullptr), effort,
@@ -353,6 +408,12 @@ void CullMap::draw_polar(const Eye& eye, const Chosen& chosen, const Effort& eff
   if (chosen) limits.only = *chosen;
   if (!chosen || !chosen->empty())
     draw_walls(walls_, eye.single, eye.floors, limits, guards_, scratch.polar, stats.polar);
+  if (scratch.added) {
+    DrawLimits of_added;
+    of_added.most = effort.draw;
+    draw_walls(*scratch.added, eye.single, eye.floors, of_added, guards_, scratch.polar,
+               stats.polar);
+  }
   scratch.polar.finish(eye.floors.undersides);
 }
 
@@ -454,6 +515,39 @@ void CullMap::find(const BoxTree& tree, const Eye& eye, std::uint64_t most, Scra
       }
     }
   }
+}
+
+/// Few changes of occluders come in a while in which many solves do: the last one is kept.
+std::shared_ptr<const WallSet> CullMap::added_walls(const Amendment* amendment) const {
+  if (amendment == nullptr || !amendment->occluders || amendment->occluders->added.empty())
+    return nullptr;
+  const std::lock_guard lock(added_mutex_);
+  if (added_of_.lock() != amendment->occluders) {
+    added_ = std::make_shared<const WallSet>(
+        make_walls(amendment->occluders->added, occluders_.floor, origin_));
+    added_of_ = amendment->occluders;
+  }
+  return added_;
+}
+
+/// Appends the placed objects that the finished map does not hide, and those that it cannot judge:
+/// beyond the extent that the slack was made for single precision cannot tell them from the eye,
+/// and below the floor sight lines pass under what reaches down without end.
+void CullMap::find_placed(const Eye& eye, const Amendment& amendment, Scratch& scratch,
+                          Stats& stats) const {
+  std::vector<Aabb> boxes;
+  std::vector<std::uint32_t> ids;
+  for (const Amendment::Placed& p : amendment.placed) {
+    const Vec3 far = glm::max(glm::abs(p.bounds.lo - origin_), glm::abs(p.bounds.hi - origin_));
+    if (!(std::max({far.x, far.y, far.z}) <= extent_m_) || !(p.bounds.lo.y >= occluders_.floor)) {
+      scratch.visible.push_back(p.object);
+      continue;
+    }
+    boxes.push_back(p.bounds);
+    ids.push_back(p.object);
+  }
+  find(BoxTree::pack(boxes, ids, origin_), eye, Effort::kUnbounded, scratch, scratch.visible,
+       stats);
 }
 
 void CullMap::find_objects(const Eye& eye, const Effort& effort, Scratch& scratch,

@@ -53,6 +53,11 @@ class CullMap : public Method {
   /// The polar map keeps to it. Of several threads one tests when testing is bounded.
   Result<Pvs> solve(const ViewCell& cell, const Effort& effort, Work& done) const override;
   bool keeps_to_effort() const override { return !orthographic_; }
+  /// On the polar map. Objects that are put beyond the scene's extent, or below its floor, are
+  /// listed.
+  Result<Pvs> solve(const ViewCell& cell, const Effort& effort, const Amendment& amendment,
+                    Work& done) const override;
+  bool takes_amendments() const override { return !orthographic_; }
   Result<Pvs> solve(const ViewCell& cell, Stats& stats) const;
   /// No solve draws or tests more, but those by LastShown: all walls, each over all bins; all
   /// nodes.
@@ -68,11 +73,14 @@ class CullMap : public Method {
   using Chosen = std::optional<std::vector<std::uint32_t>>;
 
   Result<Pvs> solve(const ViewCell& cell, LastShown* last, const Effort& effort,
-                    Stats& stats) const;
+                    const Amendment* amendment, Stats& stats) const;
+  void find_placed(const Eye& eye, const Amendment& amendment, Scratch& scratch,
+                   Stats& stats) const;
+  std::shared_ptr<const WallSet> added_walls(const Amendment* amendment) const;
   Chosen largest_solids(const Eye& eye, const std::vector<std::uint32_t>* among) const;
   void mark_promising(const Eye& eye, const Effort& effort, Scratch& scratch, Stats& stats) const;
-  Status draw_selected(const Eye& eye, LastShown* last, const Effort& effort, Scratch& scratch,
-                       Stats& stats) const;
+  Status draw_selected(const Eye& eye, LastShown* last, const Effort& effort,
+                       const Amendment* amendment, Scratch& scratch, Stats& stats) const;
   Status draw(const Eye& eye, const Chosen& chosen, const Effort& effort, Scratch& scratch,
               Stats& stats) const;
   void draw_polar(const Eye& eye, const Chosen& chosen, const Effort& effort, Scratch& scratch,
@@ -96,6 +104,7 @@ class CullMap : public Method {
   std::uint32_t bins_a_face_;
   Vec3 origin_;
   BoxTree objects_;
+  std::vector<std::uint32_t> solid_of_;  ///< of walls_, by index into OccluderSet::shrunk
   WallSet walls_;
   std::vector<std::uint32_t> corners_;  ///< of each solid of walls_
   bool all_floored_ = true;
@@ -107,6 +116,11 @@ class CullMap : public Method {
   std::unique_ptr<ShadowDrawer> shadows_;
   mutable std::atomic<bool> shadows_failed_{false};
   std::unique_ptr<TerrainMap> terrain_;
+  double extent_m_ = 0;  ///< of the scene, to each side of origin_
+  /// The walls of a change's added prisms, the last that was asked for.
+  mutable std::mutex added_mutex_;
+  mutable std::weak_ptr<const OccluderChange> added_of_;
+  mutable std::shared_ptr<const WallSet> added_;
   mutable std::mutex scratch_mutex_;
   mutable std::vector<std::unique_ptr<Scratch>> scratch_;
 };

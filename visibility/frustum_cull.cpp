@@ -14,11 +14,13 @@ class FrustumCull final : public CulledMethod {
       : CulledMethod(std::move(method)), scene_(scene), frustum_(frustum), slack_m_(slack_m) {}
 
  private:
-  void cull(const ViewCell& cell, std::vector<ObjectId>& objects) const override {
+  void cull(const ViewCell& cell, const Amendment* amendment,
+            std::vector<ObjectId>& objects) const override {
     const FrustumSweep sweep(frustum_, cell, slack_m_);
     std::erase_if(objects, [&](ObjectId id) {
       const Object& o = scene_.objects[id];
-      return !o.always_visible && !sweep.may_meet(o.bounds);
+      return !o.always_visible && !sweep.may_meet(o.bounds) &&
+             (amendment == nullptr || !amendment->is_gone(id));
     });
   }
 

@@ -44,8 +44,7 @@ struct Entry {
 
 const std::vector<Entry>& entries() {
   static const std::vector<Entry> all{
-      {CullMap::make_traits(),
-       make_cull_map, true},
+      {CullMap::make_traits(), make_cull_map, true},
       {OcclusionMap::make_traits(), make_occlusion_map, true},
       {reference_traits(),
        [](const Scene& s, const OccluderSet& o, const MethodOptions& m) -> Made {

@@ -11,6 +11,7 @@
 #include "core/result.h"
 #include "occluders/occluder_set.h"
 #include "scenes/scene.h"
+#include "visibility/amendment.h"
 #include "visibility/effort.h"
 
 namespace ivis {
@@ -113,6 +114,13 @@ class Method {
     return solve(cell);
   }
   virtual bool keeps_to_effort() const { return false; }
+  /// The same for a scene that has changed. Guarantee: traits().guarantee, for that scene.
+  /// Errors: kUnsupported unless takes_amendments().
+  virtual Result<Pvs> solve(const ViewCell& /*cell*/, const Effort& /*effort*/,
+                            const Amendment& /*amendment*/, Work& /*done*/) const {
+    return unsupported("the method " + traits().name + " takes no changes of the scene");
+  }
+  virtual bool takes_amendments() const { return false; }
 };
 
 /// Traits of every registered method.

@@ -87,16 +87,16 @@ TEST(Record, ReadsBackToTheLastBit) {
 }
 
 TEST(Record, ErrorsNameFileLineFoundAndExpected) {
-  const std::string head = "ivis-record 2\nscene 0123456789abcdef\nreach disc:1\nobjects 20\n";
+  const std::string head = "ivis-record 3\nscene 0123456789abcdef\nreach disc:1\nobjects 20\n";
   const auto error_of = [](const std::string& text) {
     const auto r = decode_record(text, "walk.rec");
     EXPECT_FALSE(r) << text;
     return r ? "" : r.error().message;
   };
   EXPECT_THAT(error_of("nonsense"),
-              HasSubstr("'walk.rec' line 1: found 'nonsense', expected 'ivis-record 2'"));
-  EXPECT_THAT(error_of("ivis-record 2\nscene 12\n"), HasSubstr("line 2"));
-  EXPECT_THAT(error_of("ivis-record 2\nscene 0123456789abcdef\nreach disk:1\n"),
+              HasSubstr("'walk.rec' line 1: found 'nonsense', expected 'ivis-record 3'"));
+  EXPECT_THAT(error_of("ivis-record 3\nscene 12\n"), HasSubstr("line 2"));
+  EXPECT_THAT(error_of("ivis-record 3\nscene 0123456789abcdef\nreach disk:1\n"),
               HasSubstr("disk:1"));
   EXPECT_THAT(error_of(head + "frame 0 1 0 0 0 disc:1 0 0 0 0 0 nan covered 0 0"),
               HasSubstr("line 5: the eye: found 'nan'"));

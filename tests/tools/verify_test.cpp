@@ -17,7 +17,7 @@ constexpr const char* kReach = "cylinder:1.5,0.1";
 std::string record_of(const std::string& hash, const std::vector<unsigned>& ids,
                       const std::string& how = "covered", const std::string& eye = "10 1.7 28") {
   std::ostringstream text;
-  text << "ivis-record 2\nscene " << hash << "\nreach " << kReach << "\nobjects "
+  text << "ivis-record 3\nscene " << hash << "\nreach " << kReach << "\nobjects "
        << SmallTown::kObjects << "\nframe 0 1 10 1.7 28 " << kReach << ' ' << eye << ' ' << eye
        << ' ' << how << " 0 " << ids.size();
   unsigned before = 0;

@@ -116,16 +116,18 @@ typedef enum ivis_cause {
   IVIS_CAUSE_SPEED = 3,        /* the eye moved faster than the pace told */
   IVIS_CAUSE_LADDER = 4,       /* the server has no cell as large as the pace needs */
   IVIS_CAUSE_LATE = 5,         /* the next PVS is later than those before it were */
-  IVIS_CAUSE_OTHER = 6 /* no pace was told, nothing is measured yet, or a cell was centred by
-                          prediction where the eye did not go */
+  IVIS_CAUSE_OTHER = 6,  /* no pace was told, nothing is measured yet, or a cell was centred by
+                             prediction where the eye did not go */
+  IVIS_CAUSE_EXPIRED = 7 /* the eye is inside, but something that moves by itself may be anywhere */
 } ivis_cause;
-#define IVIS_CAUSES 7
+#define IVIS_CAUSES 8
 
 /* What holds for one frame. */
 typedef struct ivis_frame {
   double eye[3];         /* draw from here: the eye given, or held back under IVIS_POLICY_STALL */
   uint8_t covered;       /* 1: the set below is complete for `eye` by a PVS in hand */
-  uint8_t stalled;       /* 1: `eye` was held back */
+  uint8_t stalled;       /* 1: `eye` was held back, or time is: under IVIS_CAUSE_EXPIRED what moves
+                            by itself is to be held where it is */
   uint8_t everything;    /* 1: every object is visible */
   uint8_t connected;     /* 1: the server has been heard of lately */
   uint32_t sequence;     /* of the pose whose PVS is in use; 0: none yet */
@@ -138,6 +140,7 @@ typedef struct ivis_frame {
   double margin_m;        /* from the eye to the cell's border, along the ground for upright
                              cells; 0 outside and without one */
   double safe;            /* the part of the pace that cells hold, 0 to 1; 1 while not known */
+  uint32_t epoch;         /* of the scene to draw: see ivis_client_changes(); 0: as in the file */
   const uint64_t* visible_bits; /* bit (id & 63) of word (id >> 6); valid until the next call with
                                    this client, NULL while object_count is 0 */
 } ivis_frame;
@@ -155,6 +158,57 @@ IVIS_API ivis_status ivis_client_view(ivis_client* client, const double eye[3], 
 /* Blocks until the PVS of the latest pose is there, at most timeout_ms. Errors: TIMEOUT, MISMATCH.
  */
 IVIS_API ivis_status ivis_client_wait(ivis_client* client, int32_t timeout_ms);
+
+/* ---- A scene that changes while it is served. ---- */
+
+typedef enum ivis_edit_kind {
+  IVIS_EDIT_MOVE = 1,         /* to `position` and `rotation` */
+  IVIS_EDIT_REMOVE = 2,       /* it is neither drawn nor hides anything */
+  IVIS_EDIT_ADD = 3,          /* a removed object comes back */
+  IVIS_EDIT_OCCLUDER_OFF = 4, /* it hides nothing, as an open door; it is drawn all the same */
+  IVIS_EDIT_OCCLUDER_ON = 5
+} ivis_edit_kind;
+
+typedef struct ivis_edit {
+  uint8_t kind;       /* ivis_edit_kind */
+  uint32_t id;        /* of an object; of occluders also object_count + k, the k-th node of the file
+                         that only occludes */
+  double position[3]; /* MOVE: where the origin of the object's node comes to, world metres */
+  float rotation[4];  /* x, y, z, w, unit: its turn from how the scene file has it */
+  float speed_m_s;    /* above 0: it goes on by itself, at most so fast: wherever it is drawn at a
+                         time t after this edit is within speed * (t + 0.1 s) of `position` */
+} ivis_edit;
+
+/* Asks the server to change the scene for all its clients: all `count` (1 to 1024) edits in their
+ * order, or nothing. Returns at once; *request (may be NULL) names what
+ * ivis_client_edit_result() tells. The change shows when a PVS of the changed scene is there.
+ * Errors: ARGUMENT for an edit that is none; CONNECTION, then nothing is asked. */
+IVIS_API ivis_status ivis_client_edit(ivis_client* client, const ivis_edit* edits, size_t count,
+                                      uint32_t* request);
+
+typedef struct ivis_edit_result {
+  uint32_t request;
+  uint32_t epoch;      /* of the scene as changed; 0: refused, or not known as the session ended */
+  const char* refused; /* why; "" if done; valid until the next call with this client */
+} ivis_edit_result;
+/* 1 and the oldest result that was not taken, 0 if there is none. Takes in what has arrived. */
+IVIS_API int ivis_client_edit_result(ivis_client* client, ivis_edit_result* out);
+
+typedef struct ivis_object_state {
+  uint32_t id;
+  uint8_t removed;
+  uint8_t occluder_off;
+  uint8_t moved;      /* 1: position and rotation hold; 0: it is where the scene file has it */
+  double position[3]; /* as in ivis_edit */
+  float rotation[4];
+  float speed_m_s;
+} ivis_object_state;
+
+/* The objects that changed between the view before the last and the last, each as it is in the
+ * scene of the last view (ivis_frame.epoch): to be applied before that is drawn. Whoever edited
+ * them; after a reconnection also what is as in the file again. Valid until the next view. */
+IVIS_API ivis_status ivis_client_changes(ivis_client* client, const ivis_object_state** states,
+                                         size_t* count);
 
 /* Can the object be seen? An id that is not known counts as visible. No call, no lock. */
 static inline int ivis_frame_visible(const ivis_frame* frame, uint32_t id) {

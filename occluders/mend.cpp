@@ -1,0 +1,77 @@
+#include "occluders/mend.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "occluders/fuse.h"
+#include "occluders/prisms.h"
+#include "occluders/shrink_stack.h"
+
+namespace ivis {
+namespace {
+
+bool same(const Prism& a, const Prism& b) {
+  return a.bottom == b.bottom && a.top == b.top && a.footprint.rings == b.footprint.rings;
+}
+
+std::vector<Prism> shrink_solids(const std::vector<Prism>& solids, const OccluderSet& set,
+                                 const Eroder& eroder) {
+  std::vector<Prism> out;
+  const Reach grown = shrink_reach(set);
+  for (const FusedStack& stack : fuse(solids, set.floor, {}, {})) {
+    ShrunkStack shrunk = shrink_stack(stack, set, grown, eroder);
+    std::ranges::move(shrunk.prisms, std::back_inserter(out));
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<Prism> mend(const OccluderIndex& index, std::span<const Displaced> displaced,
+                        const Eroder& eroder) {
+  const OccluderSet& set = index.occluders();
+  std::vector<Aabb> blocks;  // of the prisms that are out of use
+  for (const Displaced& d : displaced)
+    for (const std::uint32_t i : index.touched(d.bounds))
+      blocks.push_back(index.box(i));
+  const auto near_blocks = [&](const Aabb& box) {
+    return std::ranges::any_of(blocks, [&](const Aabb& b) { return b.overlaps(box); });
+  };
+  struct Near {
+    Aabb box;
+    std::uint32_t solid;
+    bool missing;
+  };
+  std::vector<Near> near;
+  for (std::uint32_t s = 0; s < set.solids.size(); ++s)
+    if (const Aabb box = set.solids[s].bounds(); near_blocks(box)) near.push_back({box, s, false});
+  for (const Displaced& d : displaced) {
+    std::size_t found = 0;
+    for (Near& n : near)
+      if (n.box.overlaps(d.bounds) && std::ranges::any_of(d.solids, [&](const Prism& p) {
+            return same(p, set.solids[n.solid]);
+          })) {
+        n.missing = true;
+        ++found;
+      }
+    if (found >= d.solids.size()) continue;
+    for (Near& n : near)
+      n.missing = n.missing || n.box.overlaps(d.bounds);
+  }
+  std::vector<Prism> solids;
+  for (const Near& n : near)
+    if (!n.missing) solids.push_back(set.solids[n.solid]);
+  return shrink_solids(solids, set, eroder);
+}
+
+ShrunkObject shrink_object(const Scene& scene, const Object& object, const OccluderSet& set,
+                           const Eroder& eroder) {
+  ShrunkObject out;
+  const std::vector<Prism> solids = extract_prisms(scene, object).prisms;
+  for (const Prism& p : solids)
+    out.solids.push_back(p.bounds());
+  out.prisms = shrink_solids(solids, set, eroder);
+  return out;
+}
+
+}  // namespace ivis

@@ -1,0 +1,58 @@
+#include "occluders/touched.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "core/view_cell.h"
+#include "occluders/ground_soup.h"
+
+namespace ivis {
+namespace {
+
+/// More than the tolerances by which W is larger than the reach, and than bounds are rounded by.
+constexpr double kMoreM = 0.05;
+
+Box2 ground_box(const Aabb& box) {
+  return {{box.lo.x, box.lo.z}, {box.hi.x, box.hi.z}};
+}
+
+}  // namespace
+
+OccluderIndex::OccluderIndex(const OccluderSet& set) : set_(set) {
+  const Vec3 reach = padded(set.reach, set.slack_m).half_extents();
+  std::vector<Box2> flat;
+  for (const Prism& p : set.shrunk) {
+    Aabb box = p.bounds();
+    for (int axis : {0, 2}) {
+      box.lo[axis] -= reach[axis] + kMoreM;
+      box.hi[axis] += reach[axis] + kMoreM;
+    }
+    box.lo.y = -std::numeric_limits<double>::infinity();
+    box.hi.y += kMoreM;  // no w of W rises
+    boxes_.push_back(box);
+    flat.push_back(ground_box(box));
+  }
+  tree_ = RectTree(flat);
+}
+
+std::vector<std::uint32_t> OccluderIndex::touched(const Aabb& matter) const {
+  std::vector<std::uint32_t> out;
+  tree_.all(ground_box(matter), [&](std::uint32_t i) {
+    if (boxes_[i].overlaps(matter)) out.push_back(i);
+    return true;
+  });
+  std::ranges::sort(out);
+  return out;
+}
+
+bool is_matter(const Scene& scene, const Object& object) {
+  if (object.tag == OccluderTag::kNever || object.always_visible) return false;
+  return std::ranges::any_of(scene.mesh_of(object).primitives,
+                             [](const Primitive& p) { return p.opaque && p.triangles > 0; });
+}
+
+bool holds_ground(const Scene& scene, const Object& object) {
+  return may_be_ground(scene, object);
+}
+
+}  // namespace ivis

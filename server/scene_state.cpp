@@ -1,0 +1,232 @@
+#include "server/scene_state.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "scenes/edited.h"
+
+namespace ivis::server {
+namespace {
+
+std::string describe(const Object& object, ObjectId id) {
+  return "object " + std::to_string(id) + " (node " + std::to_string(object.node) + ")";
+}
+
+bool same_place(const Object& object, const Placement& p) {
+  return p.position == Vec3(object.to_world[3]) && p.rotation == glm::fquat(1, 0, 0, 0);
+}
+
+Aabb grown(const Aabb& box, double by) {
+  return {box.lo - by, box.hi + by};
+}
+
+/// More than this many are not counted down again.
+constexpr std::uint8_t kMostBlamed = 255;
+
+}  // namespace
+
+SceneState::SceneState(const Scene& scene) : scene_(scene), mender_(scene) {}
+
+std::uint32_t SceneState::occluder_count() const {
+  return static_cast<std::uint32_t>(scene_.objects.size() + scene_.hidden_solids.size());
+}
+
+const Object& SceneState::object(ObjectId id) const {
+  return id < scene_.objects.size() ? scene_.objects[id]
+                                    : scene_.hidden_solids[id - scene_.objects.size()];
+}
+
+std::string SceneState::why_not(const Edit& edit) const {
+  const bool of_occluder =
+      edit.kind == EditKind::kOccluderOff || edit.kind == EditKind::kOccluderOn;
+  const std::uint32_t known =
+      of_occluder ? occluder_count() : static_cast<std::uint32_t>(scene_.objects.size());
+  if (edit.id >= known)
+    return (of_occluder ? "no occluder " : "no object ") + std::to_string(edit.id) +
+           ", expected an id below " + std::to_string(known);
+  if (!scene_.wholes.empty())
+    return "the scene is split into clusters (granularity cluster), which are not moved singly";
+  if (holds_ground(scene_, object(edit.id)))
+    return describe(object(edit.id), edit.id) +
+           " is ground that buildings stand on, which cannot be changed";
+  if (entry_.size() >= kMostChanged && !entry_.contains(edit.id))
+    return "more than " + std::to_string(kMostChanged) + " objects changed";
+  return {};
+}
+
+SceneState::Outcome SceneState::apply(std::span<const Edit> edits, Time now) {
+  for (const Edit& e : edits)
+    if (std::string why = why_not(e); !why.empty()) return {0, std::move(why)};
+  ++epoch_;
+  const std::uint64_t before = matter_version_;
+  for (const Edit& e : edits)
+    apply_one(e, now);
+  if (matter_version_ != before) order_mending();
+  return {epoch_, {}};
+}
+
+void SceneState::apply_one(const Edit& edit, Time now) {
+  const Object& o = object(edit.id);
+  auto found = entry_.find(edit.id);
+  if (found == entry_.end()) {
+    changed_.push_back({});
+    found = entry_.emplace(edit.id, std::prev(changed_.end())).first;
+    Entry& fresh = changed_.back();
+    fresh.state.id = edit.id;
+    fresh.state.placement.position = Vec3(o.to_world[3]);
+    fresh.bounds = o.bounds;
+  } else {
+    changed_.splice(changed_.end(), changed_, found->second);
+  }
+  Entry& entry = *found->second;
+  ObjectState& s = entry.state;
+  const bool was_gone = s.removed || s.moved || s.speed_m_s > 0;
+  const bool moved_itself = s.speed_m_s > 0;
+  entry.epoch = epoch_;
+  switch (edit.kind) {
+    case EditKind::kMove:
+      s.placement = edit.placement;
+      s.speed_m_s = edit.speed_m_s;
+      s.moved = !same_place(o, edit.placement);
+      entry.since = now;
+      entry.bounds = as_placed(o, edit.placement).bounds;
+      break;
+    case EditKind::kRemove:
+      s.removed = true;
+      break;
+    case EditKind::kAdd:
+      s.removed = false;
+      break;
+    case EditKind::kOccluderOff:
+      s.occluder_off = true;
+      break;
+    case EditKind::kOccluderOn:
+      s.occluder_off = false;
+      break;
+  }
+  movers_ += (s.speed_m_s > 0 ? 1 : 0);
+  movers_ -= (moved_itself ? 1 : 0);
+  if (was_gone != (s.removed || s.moved || s.speed_m_s > 0)) gone_.reset();
+  if (!is_matter(scene_, o)) return;
+  // What moves by itself hides nothing.
+  const bool displaced = s.removed || s.moved || s.occluder_off || s.speed_m_s > 0;
+  if (displaced || displaced_.contains(edit.id)) ++matter_version_;
+  set_displaced(edit.id, displaced);
+}
+
+void SceneState::set_displaced(ObjectId id, bool displaced) {
+  if (displaced == displaced_.contains(id)) return;
+  if (displaced)
+    displaced_.emplace(id, object(id).bounds);
+  else
+    displaced_.erase(id);
+  for (auto& [index, rung] : rungs_) {
+    if (displaced)
+      displace(*index, rung, id);
+    else
+      replace(rung, id);
+  }
+}
+
+void SceneState::displace(const OccluderIndex& index, Rung& rung, ObjectId id) const {
+  rung.blamed.resize(index.occluders().shrunk.size(), 0);
+  const auto& touched = rung.touched.emplace(id, index.touched(displaced_.at(id))).first->second;
+  for (const std::uint32_t prism : touched)
+    if (rung.blamed[prism] != kMostBlamed) ++rung.blamed[prism];
+}
+
+void SceneState::replace(Rung& rung, ObjectId id) {
+  for (const std::uint32_t prism : rung.touched.extract(id).mapped())
+    if (rung.blamed[prism] != kMostBlamed) --rung.blamed[prism];
+}
+
+SceneState::Rung& SceneState::rung_of(const OccluderIndex& index) {
+  const auto [found, fresh] = rungs_.try_emplace(&index);
+  if (fresh && !displaced_.empty()) {
+    for (const auto& [id, box] : displaced_)
+      displace(index, found->second, id);
+    order_mending();
+  }
+  return found->second;
+}
+
+void SceneState::order_mending() {
+  Mender::Order order;
+  order.version = matter_version_;
+  for (const auto& [id, box] : displaced_) {
+    order.displaced.push_back(&object(id));
+    const ObjectState& s = entry_.at(id)->state;
+    if (s.removed || s.occluder_off || !s.moved || s.speed_m_s > 0) continue;
+    order.moved.push_back({&object(id), s.placement});
+  }
+  for (const auto& [index, rung] : rungs_)
+    order.rungs.push_back(index);
+  mender_.order(std::move(order));
+}
+
+std::vector<ObjectState> SceneState::since(std::uint32_t epoch) const {
+  if (epoch > epoch_) epoch = 0;
+  std::vector<ObjectState> out;
+  for (auto e = changed_.rbegin(); e != changed_.rend() && e->epoch > epoch; ++e)
+    if (e->state.id < scene_.objects.size()) out.push_back(e->state);
+  return out;
+}
+
+std::shared_ptr<const Amendment> SceneState::amendment(const OccluderIndex& index, Time now,
+                                                       Time until) {
+  if (epoch_ == 0) return nullptr;
+  Rung& rung = rung_of(index);
+  if (auto mended = mender_.take(); mended && mended->version == matter_version_)
+    mended_ = std::move(*mended);
+  if (!gone_) {
+    auto bits = std::make_shared<std::vector<std::uint64_t>>((scene_.objects.size() + 63) / 64);
+    for (const Entry& e : changed_) {
+      const ObjectId id = e.state.id;
+      if (id >= scene_.objects.size()) continue;
+      // A mover of the scene file's own (skinned, animated) is listed wherever it is put.
+      const bool gone = e.state.removed || ((e.state.moved || e.state.speed_m_s > 0) &&
+                                            !scene_.objects[id].always_visible);
+      if (gone) (*bits)[id / 64] |= std::uint64_t{1} << (id % 64);
+    }
+    gone_ = std::move(bits);
+  }
+  const std::uint64_t version = 2 * matter_version_ + (mended_.version == matter_version_ ? 1 : 0);
+  if (!displaced_.empty() && (!rung.current || rung.version != version)) {
+    rung.current = change_of(index, rung);
+    rung.version = version;
+  }
+  auto out = std::make_shared<Amendment>();
+  out->gone = gone_;
+  if (!displaced_.empty()) out->occluders = rung.current;
+  const auto seconds = [](Time::duration d) { return std::chrono::duration<double>(d).count(); };
+  for (const Entry& e : changed_) {
+    const ObjectState& s = e.state;
+    if (s.removed || !(s.moved || s.speed_m_s > 0) || scene_.objects[s.id].always_visible) continue;
+    // Wherever it is drawn while the PVS is in use, as the edit that told of it promised.
+    Aabb box = e.bounds;
+    if (s.speed_m_s > 0) {
+      box = grown(box, s.speed_m_s * (seconds(std::max(until, now) - e.since) + kMoverLagS));
+      // Nothing sinks below all there is.
+      box.lo.y = std::max(box.lo.y, std::min(e.bounds.lo.y, index.occluders().floor));
+    }
+    out->placed.push_back({s.id, box});
+  }
+  return out;
+}
+
+std::shared_ptr<const OccluderChange> SceneState::change_of(const OccluderIndex& index,
+                                                            Rung& rung) const {
+  auto change = std::make_shared<OccluderChange>();
+  change->shrunk_off = rung.blamed;
+  for (const auto& [id, box] : displaced_)
+    change->displaced.push_back(box);
+  if (mended_.version == matter_version_)
+    if (const auto found = mended_.rungs.find(&index); found != mended_.rungs.end()) {
+      change->added = found->second.added;
+      change->added_solids = found->second.solids;
+    }
+  return change;
+}
+
+}  // namespace ivis::server

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <list>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "core/edit.h"
+#include "occluders/touched.h"
+#include "scenes/scene.h"
+#include "server/mender.h"
+#include "visibility/amendment.h"
+
+namespace ivis::server {
+
+/// The scene as edits have left it: what each object is now, and what that means for the occluders
+/// of each rung. An edit costs what it touches: the tree of objects and the maps' walls stay as
+/// they are, answers are computed with an Amendment. Guarantee: whatever may rest on matter that is
+/// not where the scene file has it hides nothing. A
+///            mover is listed wherever it may be seen within its speed from where it was last told,
+///            kMoverLag before included, so that clients may draw it a little late.
+/// Threads:   one at a time; mending goes on in a thread of its own. Ownership: borrows the scene
+///            and the occluders, by the indices given.
+class SceneState {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  static constexpr double kMoverLagS = 0.1;
+  /// That a message can tell of.
+  static constexpr std::size_t kMostChanged = 1'000'000;
+
+  explicit SceneState(const Scene& scene);
+
+  struct Outcome {
+    std::uint32_t epoch = 0;  ///< 0: refused, and nothing was done
+    std::string why;
+  };
+  /// All or nothing. Cost: microseconds an edit, and a few more for each occluder touched.
+  Outcome apply(std::span<const Edit> edits, Time now);
+
+  std::uint32_t epoch() const { return epoch_; }
+  /// What has changed since that epoch, as it is now; later epochs than epoch() count as 0.
+  std::vector<ObjectState> since(std::uint32_t epoch) const;
+  /// Is there anything that moves by itself?
+  bool moves() const { return movers_ > 0; }
+  /// For a PVS that is in use from `now` to `until`, by the occluders behind `index`; null: the
+  /// scene is as in the file. Cost: a copy a moved object; after an edit of matter also one of the
+  /// masks.
+  std::shared_ptr<const Amendment> amendment(const OccluderIndex& index, Time now, Time until);
+  /// Is something being shrunk anew, or waiting to be taken into use?
+  bool mending() const { return mender_.busy(); }
+
+ private:
+  struct Entry {
+    ObjectState state;
+    std::uint32_t epoch = 0;  ///< of its last change
+    Time since{};             ///< when its placement was told
+    Aabb bounds;              ///< as placed
+  };
+  /// What the edits mean to one rung.
+  struct Rung {
+    std::map<ObjectId, std::vector<std::uint32_t>> touched;  ///< prisms, by what is displaced
+    std::vector<std::uint8_t> blamed;                        ///< how many displaced touch a prism
+    std::shared_ptr<const OccluderChange> current;
+    std::uint64_t version = 0;
+  };
+
+  std::uint32_t occluder_count() const;
+  const Object& object(ObjectId id) const;
+  std::string why_not(const Edit& edit) const;
+  void apply_one(const Edit& edit, Time now);
+  void set_displaced(ObjectId id, bool displaced);
+  void displace(const OccluderIndex& index, Rung& rung, ObjectId id) const;
+  static void replace(Rung& rung, ObjectId id);
+  std::shared_ptr<const OccluderChange> change_of(const OccluderIndex& index, Rung& rung) const;
+  Rung& rung_of(const OccluderIndex& index);
+  void order_mending();
+
+  const Scene& scene_;
+  std::uint32_t epoch_ = 0;
+  std::list<Entry> changed_;  ///< ascending epochs
+  std::unordered_map<ObjectId, std::list<Entry>::iterator> entry_;
+  std::shared_ptr<const std::vector<std::uint64_t>> gone_;  ///< null: to be made anew
+  std::map<ObjectId, Aabb> displaced_;  ///< matter that is not where the file has it
+  std::uint64_t matter_version_ = 0;
+  std::size_t movers_ = 0;
+  std::map<const OccluderIndex*, Rung> rungs_;
+  Mender::Mended mended_;  ///< counts while it is of matter_version_
+  Mender mender_;
+};
+
+}  // namespace ivis::server
