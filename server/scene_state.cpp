@@ -137,7 +137,8 @@ void SceneState::displace(const OccluderIndex& index, Rung& rung, ObjectId id) c
 }
 
 void SceneState::replace(Rung& rung, ObjectId id) {
-  for (const std::uint32_t prism : rung.touched.extract(id).mapped())
+  const auto touched = rung.touched.extract(id);
+  for (const std::uint32_t prism : touched.mapped())
     if (rung.blamed[prism] != kMostBlamed) --rung.blamed[prism];
 }
 
