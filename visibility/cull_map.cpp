@@ -192,7 +192,9 @@ Result<Pvs> CullMap::solve(const ViewCell& cell, const Effort& effort, const Ame
   Effort bounded = effort;
   if (effort.strategy == Strategy::kGuaranteed) bounded.draw = bounded.test = Effort::kUnbounded;
   auto pvs = solve(cell, nullptr, bounded, &amendment, stats);
-  done = {stats.polar.draw_work(), stats.polar.nodes_tested, stats.polar.cut};
+  // What is left out since it may hide nothing any more was not cut.
+  const bool cut = stats.polar.cut && effort.strategy != Strategy::kGuaranteed;
+  done = {stats.polar.draw_work(), stats.polar.nodes_tested, cut};
   return pvs;
 }
 

@@ -257,6 +257,139 @@ TEST_F(ClientOverTcp, AReachBeyondTheServersIsAnError) {
   EXPECT_STREQ(VisibilityClient::connect(options).info()->reach, "disc:0.5");
 }
 
+ivis_edit an_edit(ivis_edit_kind kind, std::uint32_t id, double x = 0, float speed = 0) {
+  ivis_edit e{};
+  e.kind = static_cast<std::uint8_t>(kind);
+  e.id = id;
+  e.position[0] = x;
+  e.rotation[3] = 1;
+  e.speed_m_s = speed;
+  return e;
+}
+
+ivis_edit_result result_of(VisibilityClient& client) {
+  ivis_edit_result result;
+  for (int i = 0; i < kWait; ++i) {
+    if (ivis_client_edit_result(client.get(), &result) != 0) return result;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  ADD_FAILURE() << "no result";
+  return {};
+}
+
+std::vector<ivis_object_state> changes(VisibilityClient& client) {
+  const ivis_object_state* states = nullptr;
+  std::size_t count = 0;
+  EXPECT_EQ(ivis_client_changes(client.get(), &states, &count), IVIS_OK);
+  return {states, states + count};
+}
+
+/// Looks, without a pose, until the scene is at that epoch; the changes that came with it.
+std::vector<ivis_object_state> look_until(VisibilityClient& client, const double (&eye)[3],
+                                          std::uint32_t epoch) {
+  std::vector<ivis_object_state> all;
+  for (int i = 0; i < kWait; ++i) {
+    const PvsView view = client.view(eye);
+    for (const auto& c : changes(client))
+      all.push_back(c);
+    if (view.raw().epoch == epoch && view.raw().sequence != 0) return all;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  ADD_FAILURE() << "no PVS of epoch " << epoch;
+  return all;
+}
+
+TEST_F(ClientOverTcp, AnEditReachesAClientThatOnlyLooksTogetherWithItsSet) {
+  RunningServer server(scene, method);
+  auto editor = connect(server.endpoint());
+  auto looker = connect(server.endpoint());
+  const double eye[3]{10, 1.7, 10};
+  looker.pose(eye);
+  ASSERT_EQ(looker.wait(kWait), IVIS_OK);
+  const auto before = ids(looker.view(eye));
+  const std::uint32_t near = *before.begin();
+  std::uint32_t request = 0;
+  const ivis_edit edits[]{an_edit(IVIS_EDIT_REMOVE, near), an_edit(IVIS_EDIT_MOVE, 399, 8.5)};
+  ASSERT_EQ(ivis_client_edit(editor.get(), edits, 2, &request), IVIS_OK);
+  const auto result = result_of(editor);
+  EXPECT_EQ(result.request, request);
+  EXPECT_EQ(result.epoch, 1U);
+  EXPECT_STREQ(result.refused, "");
+  const auto changed = look_until(looker, eye, 1);
+  ASSERT_EQ(changed.size(), 2U);
+  EXPECT_EQ(changed[0].id, near);
+  EXPECT_EQ(changed[0].removed, 1);
+  EXPECT_EQ(changed[1].id, 399U);
+  EXPECT_EQ(changed[1].moved, 1);
+  EXPECT_EQ(changed[1].position[0], 8.5);
+  const PvsView after = looker.view(eye);
+  EXPECT_FALSE(after.visible(near));
+  EXPECT_TRUE(changes(looker).empty()) << "each change is told once";
+}
+
+TEST_F(ClientOverTcp, EditsThatAreNoneAreRefusedHereAndUnknownIdsThere) {
+  RunningServer server(scene, method);
+  auto client = connect(server.endpoint());
+  const auto error_of = [&](const ivis_edit& e) {
+    EXPECT_EQ(ivis_client_edit(client.get(), &e, 1, nullptr), IVIS_ERROR_ARGUMENT);
+    return client.error();
+  };
+  ivis_edit e = an_edit(IVIS_EDIT_MOVE, 1);
+  e.kind = 6;
+  EXPECT_EQ(error_of(e), "unknown kind of edit 6");
+  e = an_edit(IVIS_EDIT_MOVE, 1, NAN);
+  EXPECT_NE(error_of(e).find("object 1: a position"), std::string::npos);
+  e = an_edit(IVIS_EDIT_MOVE, 1, 0, -1);
+  EXPECT_NE(error_of(e).find("speed"), std::string::npos);
+  e = an_edit(IVIS_EDIT_MOVE, 1);
+  e.rotation[3] = 0;
+  EXPECT_NE(error_of(e).find("unit quaternion"), std::string::npos);
+  const std::vector<ivis_edit> many(1025, an_edit(IVIS_EDIT_REMOVE, 1));
+  EXPECT_EQ(ivis_client_edit(client.get(), many.data(), many.size(), nullptr), IVIS_ERROR_ARGUMENT);
+  EXPECT_EQ(ivis_client_edit(client.get(), many.data(), 0, nullptr), IVIS_ERROR_ARGUMENT);
+  e = an_edit(IVIS_EDIT_REMOVE, 400);
+  ASSERT_EQ(ivis_client_edit(client.get(), &e, 1, nullptr), IVIS_OK);
+  const auto result = result_of(client);
+  EXPECT_EQ(result.epoch, 0U);
+  EXPECT_STREQ(result.refused, "no object 400, expected an id below 400");
+}
+
+TEST_F(ClientOverTcp, AfterARestartWhatWasEditedIsToldToBeAsInTheFile) {
+  auto first = std::make_unique<RunningServer>(scene, method);
+  const std::string endpoint = first->endpoint();
+  auto client = connect(endpoint);
+  const double eye[3]{10, 1.7, 10};
+  const ivis_edit e = an_edit(IVIS_EDIT_REMOVE, 5);
+  ASSERT_EQ(ivis_client_edit(client.get(), &e, 1, nullptr), IVIS_OK);
+  EXPECT_EQ(result_of(client).epoch, 1U);
+  client.pose(eye);
+  ASSERT_EQ(look_until(client, eye, 1).size(), 1U);
+  first.reset();
+  RunningServer second(scene, method, Reach::cylinder(1.5, 0.1), endpoint);
+  client.pose(eye);
+  ASSERT_EQ(client.wait(kWait), IVIS_OK);
+  const PvsView view = client.view(eye);
+  EXPECT_EQ(view.raw().epoch, 0U);
+  const auto back = changes(client);
+  ASSERT_EQ(back.size(), 1U);
+  EXPECT_EQ(back[0].id, 5U);
+  EXPECT_EQ(back[0].removed, 0);
+}
+
+TEST_F(ClientOverTcp, AnEditWithoutAnAnswerIsToldToBeLost) {
+  auto server = std::make_unique<RunningServer>(scene, method);
+  auto client = connect(server->endpoint());
+  server.reset();
+  const ivis_edit e = an_edit(IVIS_EDIT_REMOVE, 5);
+  const ivis_status asked = ivis_client_edit(client.get(), &e, 1, nullptr);
+  if (asked == IVIS_OK) {  // the farewell had not been read
+    const auto result = result_of(client);
+    EXPECT_EQ(result.epoch, 0U);
+    EXPECT_NE(std::string(result.refused).find("the session ended"), std::string::npos);
+  }
+  EXPECT_EQ(ivis_client_edit(client.get(), &e, 1, nullptr), IVIS_ERROR_CONNECTION);
+}
+
 TEST(Client, AnAbsentServerIsAConnectionErrorThatNamesTheEndpoint) {
   ivis_client_options options = ivis_client_options_default();
   options.endpoint = "tcp://127.0.0.1:1";

@@ -246,5 +246,61 @@ TEST(RealTime, LingeringObjectsStayForTheirFrames) {
     EXPECT_NE(ivis_frame_visible(&f, id), 0) << "seen within the last 10 frames";
 }
 
+TEST(RealTime, WhereThingsMoveByThemselvesASetRunsOutThoughTheObserverStandsStill) {
+  for (const ivis_policy policy :
+       {IVIS_POLICY_STALL, IVIS_POLICY_INCOMPLETE, IVIS_POLICY_EVERYTHING}) {
+    Observer run;
+    auto options = Observer::stalling();
+    options.policy = policy;
+    run.open({5ms, [](std::uint64_t) { return Duration{1ms}; }}, std::move(options));
+    run.source->valid_us = 100'000;
+    run.walk(60, 0);
+    EXPECT_EQ(run.client->stats().causes[IVIS_CAUSE_EXPIRED], 0U) << "there is a new one in time";
+    run.source->there = false;
+    ivis_frame f{};
+    const auto look = [&] { EXPECT_EQ(run.client->view(Observer::at(0), f), IVIS_OK); };
+    run.now += 80ms;
+    look();
+    EXPECT_EQ(f.cause, IVIS_CAUSE_NONE);
+    run.source->there = true;  // reachable, yet nothing has come
+    run.now += 40ms;
+    look();
+    EXPECT_EQ(f.cause, IVIS_CAUSE_EXPIRED);
+    EXPECT_EQ(f.covered, policy == IVIS_POLICY_STALL ? 1 : 0);
+    EXPECT_EQ(f.stalled, policy == IVIS_POLICY_STALL ? 1 : 0) << "time is held";
+    EXPECT_EQ(f.everything, policy == IVIS_POLICY_EVERYTHING ? 1 : 0);
+    EXPECT_EQ(f.eye[0], Observer::at(0).x);
+    // The clock jumps.
+    run.now += 1h;
+    look();
+    EXPECT_EQ(f.cause, IVIS_CAUSE_EXPIRED);
+    run.walk(5, 0);
+    look();
+    EXPECT_EQ(f.cause, IVIS_CAUSE_NONE) << "it asks again by itself and recovers";
+    EXPECT_EQ(run.missing, 0U);
+  }
+}
+
+TEST(RealTime, ANoticeOfAChangedSceneIsAskedAboutByLooking) {
+  Observer run;
+  run.open({5ms, [](std::uint64_t) { return Duration{1ms}; }}, Observer::stalling());
+  run.walk(10, 0);
+  run.now += 1s;
+  ivis_frame f{};
+  const auto look = [&] { EXPECT_EQ(run.client->view(Observer::at(0), f), IVIS_OK); };
+  look();
+  const auto sent = run.source->sent;
+  look();
+  EXPECT_EQ(run.source->sent, sent) << "nothing to ask for";
+  run.source->scene_epoch = 3;
+  look();
+  look();
+  EXPECT_EQ(run.source->sent, sent + 1) << "once";
+  EXPECT_EQ(f.epoch, 0U);
+  run.now += 20ms;
+  look();
+  EXPECT_EQ(f.epoch, 3U);
+}
+
 }  // namespace
 }  // namespace ivis::test

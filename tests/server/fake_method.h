@@ -1,6 +1,7 @@
 #pragma once
 // A visibility method that tests of the network can predict: objects whose centre is near the cell.
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <new>
@@ -29,6 +30,19 @@ class NearMethod : public Method {
       if (everything || glm::distance(scene_.objects[id].bounds.centre(), cell.eye) <=
                             radius_m_ + cell.reach.half_extents().x)
         pvs.objects.push_back(id);
+    return pvs;
+  }
+  bool takes_amendments() const override { return true; }
+  Result<Pvs> solve(const ViewCell& cell, const Effort& /*effort*/, const Amendment& amendment,
+                    Work& /*done*/) const override {
+    auto pvs = solve(cell);
+    if (!pvs || !pvs->everything_because.empty()) return pvs;
+    std::erase_if(pvs->objects, [&](ObjectId id) { return amendment.is_gone(id); });
+    for (const Amendment::Placed& p : amendment.placed) {
+      const Vec3 nearest = glm::clamp(cell.eye, p.bounds.lo, p.bounds.hi);
+      if (glm::distance(nearest, cell.eye) <= radius_m_) pvs->objects.push_back(p.object);
+    }
+    std::sort(pvs->objects.begin(), pvs->objects.end());
     return pvs;
   }
   mutable std::atomic<int> solves{0};

@@ -11,25 +11,35 @@
 
 namespace ivis::test {
 
+/// The index of an empty set: methods that need no occluders take edits with it.
+inline const OccluderIndex& no_occluders() {
+  static const OccluderSet set;
+  static const OccluderIndex index(set);
+  return index;
+}
+
 /// A server on a thread of its own; any free port unless told otherwise.
 class RunningServer {
  public:
   RunningServer(const Scene& scene, const Method& method,
                 const Reach& reach = Reach::cylinder(1.5, 0.1),
                 const std::string& listen = "tcp://127.0.0.1:*", server::SessionLimits limits = {})
-      : RunningServer(scene, std::make_unique<server::Ladder>(reach, method, OccluderSet{}.slack_m),
-                      listen, limits) {}
+      : RunningServer(
+            scene,
+            std::make_unique<server::Ladder>(reach, method, OccluderSet{}.slack_m, &no_occluders()),
+            listen, limits) {}
   RunningServer(const Scene& scene, std::unique_ptr<server::Ladder> ladder,
                 const std::string& listen = "tcp://127.0.0.1:*", server::SessionLimits limits = {},
                 unsigned workers = 1)
       : served_(server::served_scene(scene)),
         ladder_(std::move(ladder)),
+        state_(scene),
         log_(server::LogLevel::kOff, false) {
     server::ServerOptions options;
     options.listen = listen;
     options.limits = limits;
     options.workers = workers;
-    auto bound = server::Server::bind(options, served_, *ladder_, log_);
+    auto bound = server::Server::bind(options, served_, *ladder_, log_, {}, &state_);
     if (!bound) {
       ADD_FAILURE() << bound.error().message;
       return;
@@ -49,6 +59,7 @@ class RunningServer {
  private:
   server::ServedScene served_;
   std::unique_ptr<server::Ladder> ladder_;
+  server::SceneState state_;
   server::Log log_;
   std::unique_ptr<server::Server> server_;
   std::atomic<bool> stop_{false};

@@ -506,6 +506,153 @@ TEST_F(SessionsOnALadder, AClientThatNamesItsReachGetsThatOnly) {
   }
 }
 
+class Edits : public Sessions {
+ protected:
+  const OccluderSet set;
+  const OccluderIndex index{set};
+  server::SceneState state{scene};
+  Edits() { open(); }
+  void open() {
+    ladder = std::make_unique<server::Ladder>(Reach::disc(2), method, set.slack_m, &index);
+    table_ = std::make_unique<SessionTable>(served, *ladder, limits, server::CostModel{}, &state);
+  }
+  wire::EditedMessage edit(const Peer& peer, const std::vector<Edit>& edits) {
+    const auto m = say(peer, wire::EditMessage{peer.session, ++request, edits});
+    EXPECT_TRUE(m && std::holds_alternative<wire::EditedMessage>(*m));
+    const auto edited = std::get<wire::EditedMessage>(*m);
+    EXPECT_EQ(edited.request, request);
+    return edited;
+  }
+  wire::PvsMessage ask(const Peer& peer, std::uint32_t sequence, std::uint32_t epoch,
+                       std::uint32_t hold_us = 0) {
+    say(peer, wire::PoseMessage{peer.session, sequence, 0, {4, 1, 4}, hold_us, epoch});
+    return next_pvs(peer);
+  }
+  std::uint32_t request = 0;
+};
+
+TEST_F(Edits, ComeWithTheNextSetUntilTheyAreAcknowledged) {
+  Peer a = greet("a");
+  Peer b = greet("b");
+  EXPECT_EQ(ask(a, 1, 0).changes, wire::SceneChanges{}) << "nothing was ever changed";
+  EXPECT_EQ(edit(a, {{EditKind::kRemove, 27, {}, 0}}).epoch, 1U);
+  EXPECT_EQ(edit(b, {{EditKind::kMove, 28, {{1, 0, 0}, {1, 0, 0, 0}}, 0}}).epoch, 2U);
+  for (const Peer* p : {&a, &b}) {
+    for (std::uint32_t s = 2; s < 4; ++s) {  // the first is lost
+      const auto m = ask(*p, s, 0);
+      EXPECT_EQ(m.changes.epoch, 2U);
+      EXPECT_EQ(m.changes.since, 0U);
+      EXPECT_EQ(m.changes.valid_us, 0U) << "nothing moves by itself";
+      ASSERT_EQ(m.changes.objects.size(), 2U);
+    }
+    const auto m = ask(*p, 4, 1);
+    EXPECT_EQ(m.changes.since, 1U);
+    ASSERT_EQ(m.changes.objects.size(), 1U);
+    EXPECT_EQ(m.changes.objects[0].id, 28U);
+    EXPECT_TRUE(m.changes.objects[0].moved);
+    EXPECT_TRUE(ask(*p, 5, 2).changes.objects.empty());
+    EXPECT_EQ(ask(*p, 6, 99).changes.since, 0U) << "an epoch that never was";
+  }
+  const auto m = ask(a, 7, 2);
+  EXPECT_EQ(std::ranges::count(ids(a, m), 27U), 0) << "a removed object is not listed";
+}
+
+TEST_F(Edits, AreRefusedWithTheReasonAndEndNothing) {
+  Peer a = greet("a");
+  const auto refused = edit(a, {{EditKind::kRemove, 5, {}, 0}, {EditKind::kRemove, 144, {}, 0}});
+  EXPECT_EQ(refused.epoch, 0U);
+  EXPECT_EQ(refused.text, "no object 144, expected an id below 144");
+  EXPECT_EQ(ask(a, 1, 0).changes.epoch, 0U) << "nor was the first of the two done";
+  EXPECT_EQ(table().counters().edits_refused, 1U);
+  EXPECT_EQ(reason(say(a, wire::EditMessage{a.session + 1, 1, {{EditKind::kRemove, 5, {}, 0}}})),
+            Refusal::kSession);
+  limits.edits = false;
+  open();
+  Peer b = greet("b");
+  EXPECT_EQ(edit(b, {{EditKind::kRemove, 5, {}, 0}}).text,
+            "this server takes no edits (ivisd --edits on)");
+  table_ = std::make_unique<SessionTable>(served, *ladder, server::SessionLimits{});
+  Peer c = greet("c");
+  EXPECT_EQ(edit(c, {{EditKind::kRemove, 5, {}, 0}}).text, "the method near takes no edits");
+}
+
+TEST_F(Edits, AnAnswerUnderWayIsOfTheSceneItWasBegunFor) {
+  Peer a = greet("a");
+  edit(a, {{EditKind::kOccluderOff, 3, {}, 0}});
+  pose(a, 1, {4, 1, 4});
+  auto step = table().next(now);
+  edit(a, {{EditKind::kRemove, 27, {}, 0}});
+  const auto out = table().finish(server::perform(std::move(std::get<server::Job>(step)), served));
+  ASSERT_TRUE(out);
+  const auto m = std::get<wire::PvsMessage>(decoded(*out, "a"));
+  EXPECT_EQ(m.changes.epoch, 1U);
+  EXPECT_EQ(std::ranges::count(ids(a, m), 27U), 1);
+  EXPECT_EQ(ask(a, 2, 1).changes.epoch, 2U);
+}
+
+TEST_F(Edits, WhoAsksNothingIsToldOnce) {
+  Peer a = greet("a");
+  Peer b = greet("b");
+  now = SessionTable::Time(1s);
+  ask(a, 1, 0);
+  ask(b, 1, 0);
+  EXPECT_TRUE(table().notices(now).empty());
+  edit(a, {{EditKind::kRemove, 5, {}, 0}});
+  EXPECT_TRUE(table().notices(now + 10ms).empty()) << "both will ask again soon";
+  now += 20ms;
+  ask(a, 2, 0);
+  const auto told = table().notices(now + 55ms);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(std::get<wire::NoticeMessage>(decoded(told[0], "b")).epoch, 1U);
+  EXPECT_TRUE(table().notices(now + 10s).empty());
+  edit(a, {{EditKind::kRemove, 6, {}, 0}});
+  EXPECT_EQ(table().notices(now + 10s).size(), 2U);
+}
+
+TEST_F(Edits, ASceneWithMoversIsValidForATime) {
+  Peer a = greet("a");
+  edit(a, {{EditKind::kMove, 5, {{0, 0, 0}, {1, 0, 0, 0}}, 10}});
+  EXPECT_EQ(ask(a, 1, 0, 0).changes.valid_us, 100'000U);
+  EXPECT_EQ(ask(a, 2, 0, 50'000).changes.valid_us, 150'000U);
+  EXPECT_EQ(ask(a, 3, 0, 4'000'000'000).changes.valid_us, 1'000'000U);
+  edit(a, {{EditKind::kMove, 5, {{0, 0, 0}, {1, 0, 0, 0}}, 0}});
+  EXPECT_EQ(ask(a, 4, 0, 0).changes.valid_us, 0U);
+}
+
+TEST_F(Edits, OfTheSameObjectTheLastCounts) {
+  Peer a = greet("a");
+  Peer b = greet("b");
+  for (int i = 0; i < 50; ++i) {
+    edit(a, {{EditKind::kMove, 5, {{1.0 * i, 0, 0}, {1, 0, 0, 0}}, 0}});
+    edit(b, {{i % 2 == 0 ? EditKind::kRemove : EditKind::kAdd, 5, {}, 0}});
+  }
+  for (const Peer* p : {&a, &b}) {
+    const auto m = ask(*p, 1, 0);
+    ASSERT_EQ(m.changes.objects.size(), 1U);
+    EXPECT_FALSE(m.changes.objects[0].removed);
+    EXPECT_EQ(m.changes.objects[0].placement.position.x, 49);
+    EXPECT_EQ(m.changes.epoch, 100U);
+  }
+}
+
+TEST_F(Edits, AStormOfThemKeepsNobodyFromBeingAnswered) {
+  Peer a = greet("a");
+  Peer b = greet("b");
+  std::mt19937 random(9);
+  for (std::uint32_t round = 1; round < 40; ++round) {
+    std::vector<Edit> edits;
+    for (int k = 0; k < 500; ++k)
+      edits.push_back({static_cast<EditKind>(1 + random() % 5),
+                       random() % 144,
+                       {{static_cast<double>(random() % 20), 0, 0}, {1, 0, 0, 0}},
+                       static_cast<float>(random() % 3)});
+    EXPECT_EQ(edit(a, edits).epoch, round);
+    const auto m = ask(b, round, round - 1);
+    EXPECT_EQ(m.changes.epoch, round);
+    EXPECT_LE(m.changes.objects.size(), 144U);
+  }
+}
+
 TEST_F(Sessions, GarbageIsRefusedAndCountedAndEndsNothing) {
   Peer a = greet("a");
   std::mt19937 random(7);

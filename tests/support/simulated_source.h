@@ -51,7 +51,11 @@ class SimulatedSource : public client::PvsSource {
   std::string trouble() const override { return {}; }
   client::SourceStats stats() const override { return counted; }
 
-  bool there = true;  ///< false: what is sent is lost
+  std::uint32_t epoch() const override { return scene_epoch; }
+
+  bool there = true;              ///< false: what is sent is lost
+  std::uint32_t scene_epoch = 0;  ///< of answers, and what the client has heard of
+  std::uint32_t valid_us = 0;     ///< of answers
   std::uint64_t sent = 0;
   std::uint64_t solves = 0;
   client::SourceStats counted;
@@ -78,6 +82,8 @@ class SimulatedSource : public client::PvsSource {
     a.sequence = request.sequence;
     a.cell = {request.centre, ladder_.reaches()[choice.rung]};
     a.safe = choice.safe;
+    a.epoch = scene_epoch;
+    a.valid_us = valid_us;
     const auto pvs = choice.method->solve(a.cell);
     a.everything = !pvs || !pvs->everything_because.empty();
     a.count = catalogue_.objects();
