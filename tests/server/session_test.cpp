@@ -643,7 +643,7 @@ TEST_F(Edits, AStormOfThemKeepsNobodyFromBeingAnswered) {
     std::vector<Edit> edits;
     for (int k = 0; k < 500; ++k)
       edits.push_back({static_cast<EditKind>(1 + random() % 5),
-                       random() % 144,
+                       static_cast<ObjectId>(random() % 144),
                        {{static_cast<double>(random() % 20), 0, 0}, {1, 0, 0, 0}},
                        static_cast<float>(random() % 3)});
     EXPECT_EQ(edit(a, edits).epoch, round);
