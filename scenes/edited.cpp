@@ -1,7 +1,5 @@
 #include "scenes/edited.h"
 
-#include <glm/gtc/matrix_transform.hpp>
-
 namespace ivis {
 namespace {
 
@@ -13,9 +11,9 @@ constexpr double kPlacingErrorM = 1e-3;
 Object as_placed(const Object& object, const Placement& p) {
   Object out = object;
   const Vec3 origin(object.to_world[3]);
-  out.to_world = glm::translate(Mat4(1), p.position) *
-                 glm::mat4_cast(glm::normalize(glm::dquat(p.rotation))) *
-                 glm::translate(Mat4(1), -origin) * object.to_world;
+  // Without a detour by the origin, so that what is not tilted keeps its heights to the last bit.
+  out.to_world = glm::mat4_cast(glm::normalize(glm::dquat(p.rotation))) * object.to_world;
+  out.to_world[3] = glm::dvec4(p.position, 1);
   // The corners of the box in the file hold all of the object, wherever they come to.
   const Aabb& box = object.bounds;
   out.bounds = {};

@@ -26,7 +26,10 @@ constexpr std::uint8_t kMostBlamed = 255;
 
 }  // namespace
 
-SceneState::SceneState(const Scene& scene) : scene_(scene), mender_(scene) {}
+SceneState::SceneState(const Scene& scene)
+    : scene_(scene),
+      natures_(scene.objects.size() + scene.hidden_solids.size(), 0),
+      mender_(scene) {}
 
 std::uint32_t SceneState::occluder_count() const {
   return static_cast<std::uint32_t>(scene_.objects.size() + scene_.hidden_solids.size());
@@ -37,7 +40,15 @@ const Object& SceneState::object(ObjectId id) const {
                                     : scene_.hidden_solids[id - scene_.objects.size()];
 }
 
-std::string SceneState::why_not(const Edit& edit) const {
+std::uint8_t SceneState::nature(ObjectId id) {
+  std::uint8_t& n = natures_[id];
+  if (n == 0)
+    n = static_cast<std::uint8_t>(kKnown | (is_matter(scene_, object(id)) ? kMatter : 0) |
+                                  (holds_ground(scene_, object(id)) ? kGround : 0));
+  return n;
+}
+
+std::string SceneState::why_not(const Edit& edit) {
   const bool of_occluder =
       edit.kind == EditKind::kOccluderOff || edit.kind == EditKind::kOccluderOn;
   const std::uint32_t known =
@@ -47,7 +58,7 @@ std::string SceneState::why_not(const Edit& edit) const {
            ", expected an id below " + std::to_string(known);
   if (!scene_.wholes.empty())
     return "the scene is split into clusters (granularity cluster), which are not moved singly";
-  if (holds_ground(scene_, object(edit.id)))
+  if ((nature(edit.id) & kGround) != 0)
     return describe(object(edit.id), edit.id) +
            " is ground that buildings stand on, which cannot be changed";
   if (entry_.size() >= kMostChanged && !entry_.contains(edit.id))
@@ -62,7 +73,7 @@ SceneState::Outcome SceneState::apply(std::span<const Edit> edits, Time now) {
   const std::uint64_t before = matter_version_;
   for (const Edit& e : edits)
     apply_one(e, now);
-  if (matter_version_ != before) order_mending();
+  mending_due_ = mending_due_ || matter_version_ != before;
   return {epoch_, {}};
 }
 
@@ -108,7 +119,7 @@ void SceneState::apply_one(const Edit& edit, Time now) {
   movers_ += (s.speed_m_s > 0 ? 1 : 0);
   movers_ -= (moved_itself ? 1 : 0);
   if (was_gone != (s.removed || s.moved || s.speed_m_s > 0)) gone_.reset();
-  if (!is_matter(scene_, o)) return;
+  if ((nature(edit.id) & kMatter) == 0) return;
   // What moves by itself hides nothing.
   const bool displaced = s.removed || s.moved || s.occluder_off || s.speed_m_s > 0;
   if (displaced || displaced_.contains(edit.id)) ++matter_version_;
@@ -147,7 +158,7 @@ SceneState::Rung& SceneState::rung_of(const OccluderIndex& index) {
   if (fresh && !displaced_.empty()) {
     for (const auto& [id, box] : displaced_)
       displace(index, found->second, id);
-    order_mending();
+    mending_due_ = true;
   }
   return found->second;
 }
@@ -178,6 +189,7 @@ std::shared_ptr<const Amendment> SceneState::amendment(const OccluderIndex& inde
                                                        Time until) {
   if (epoch_ == 0) return nullptr;
   Rung& rung = rung_of(index);
+  if (std::exchange(mending_due_, false)) order_mending();
   if (auto mended = mender_.take(); mended && mended->version == matter_version_)
     mended_ = std::move(*mended);
   if (!gone_) {

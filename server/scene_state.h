@@ -72,7 +72,10 @@ class SceneState {
 
   std::uint32_t occluder_count() const;
   const Object& object(ObjectId id) const;
-  std::string why_not(const Edit& edit) const;
+  /// What the object is to occluders; worked out once.
+  enum Nature : std::uint8_t { kKnown = 1, kMatter = 2, kGround = 4 };
+  std::uint8_t nature(ObjectId id);
+  std::string why_not(const Edit& edit);
   void apply_one(const Edit& edit, Time now);
   void set_displaced(ObjectId id, bool displaced);
   void displace(const OccluderIndex& index, Rung& rung, ObjectId id) const;
@@ -82,12 +85,14 @@ class SceneState {
   void order_mending();
 
   const Scene& scene_;
+  std::vector<std::uint8_t> natures_;
   std::uint32_t epoch_ = 0;
   std::list<Entry> changed_;  ///< ascending epochs
   std::unordered_map<ObjectId, std::list<Entry>::iterator> entry_;
   std::shared_ptr<const std::vector<std::uint64_t>> gone_;  ///< null: to be made anew
   std::map<ObjectId, Aabb> displaced_;  ///< matter that is not where the file has it
   std::uint64_t matter_version_ = 0;
+  bool mending_due_ = false;  ///< ordered with the next answer: who does not ask needs none
   std::size_t movers_ = 0;
   std::map<const OccluderIndex*, Rung> rungs_;
   Mender::Mended mended_;  ///< counts while it is of matter_version_
