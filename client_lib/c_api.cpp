@@ -82,6 +82,9 @@ ivis_status ivis_client_connect(const ivis_client_options* options, ivis_client*
     network.endpoint = options->endpoint;
     network.scene_hash = options->scene_hash;
     network.reach = options->reach != nullptr ? options->reach : "";
+    network.follow_scene = options->follow_scene != 0;
+    if (network.follow_scene && network.scene_hash != 0)
+      return refuse(IVIS_ERROR_ARGUMENT, "follow_scene with a scene_hash");
     network.pace = pace_of(options->pace);
     if (!network.pace.valid()) return refuse(IVIS_ERROR_ARGUMENT, kBadPace);
     if (options->strategy < IVIS_STRATEGY_SERVER || options->strategy > IVIS_STRATEGY_PREDICTIVE)

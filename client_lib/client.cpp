@@ -123,12 +123,29 @@ ivis_status ivis_client::state() {
 }
 
 void ivis_client::take() {
-  if (!source_->receive(answer_)) return;
+  const bool any = source_->receive(answer_);
+  if (const auto scenes = source_->stats().scenes; scenes != scenes_) {
+    scenes_ = scenes;
+    leave_scene();
+  }
+  if (!any || answer_.sequence == 0) return;
   note_changes();
   stats_.last_solve_ms = answer_.solve_ms;
   cell_reach_ = answer_.cell.reach.to_string();
   if (const Sent* s = sent(answer_.sequence))
     stats_.last_round_trip_ms = milliseconds(options_.now() - s->at);
+}
+
+/// Nothing that is known of the one before says anything of another. (An answer that came together
+/// with the Welcome goes too: the next pose brings one.)
+void ivis_client::leave_scene() {
+  answer_ = {};
+  states_.clear();
+  untold_.clear();
+  changes_.clear();
+  lingering_ = ivis::client::Lingering(options_.linger_frames);
+  in_use_ = 0;
+  clock_.interrupt();
 }
 
 /// The scene of an answer is drawn as soon as the answer is used: at the next view.
@@ -311,6 +328,7 @@ ivis_status ivis_client::view(const Vec3& eye, ivis_frame& out) {
   out.covered = covered ? 1 : 0;
   out.connected = source_->connected() ? 1 : 0;
   out.object_count = objects;
+  out.scene_hash = catalogue != nullptr ? catalogue->scene_hash : 0;
   out.cell_reach = cell_reach_.c_str();
   out.safe = 1;
   if (has_pvs) {

@@ -56,6 +56,7 @@ struct ivis_client {
   const ivis::client::IdBits& all_bits();
   ivis_cause why_outside(const ivis::Vec3& eye, Time now) const;
   void note_changes();
+  void leave_scene();
   bool expired(Time now) const;
   bool wants_another(Time now) const;
 
@@ -75,6 +76,7 @@ struct ivis_client {
   std::string cell_reach_;
   Time met_{};  ///< when the present session was first noticed
   ivis::client::Answer answer_;
+  std::uint64_t scenes_ = 0;                            ///< SourceStats::scenes when last looked at
   std::map<ivis::ObjectId, ivis::ObjectState> states_;  ///< of objects not as in the file
   std::map<ivis::ObjectId, ivis::ObjectState> untold_;  ///< changes since the last view
   std::vector<ivis_object_state> changes_;

@@ -224,14 +224,16 @@ struct NetworkSource::Impl {
       last_trouble = sound.error().message;
       return;
     }
-    if (catalogue && (told.node != catalogue->node || told.instance != catalogue->instance ||
-                      told.cluster != catalogue->cluster))
+    if (catalogue && told.scene_hash != catalogue->scene_hash) ++counted.scenes;
+    if (catalogue && told.scene_hash == catalogue->scene_hash &&
+        (told.node != catalogue->node || told.instance != catalogue->instance ||
+         told.cluster != catalogue->cluster))
       return fail(mismatch("the server's objects have changed under the scene hash " +
                            to_hex(w.scene_hash)));
     if (catalogue && was_lost) ++counted.reconnects;
     catalogue = std::move(told);
     id_of = std::move(w.table.id);
-    scene_hash = w.scene_hash;
+    if (!options.follow_scene) scene_hash = w.scene_hash;
     lose_edits();
     session = w.session;
     have_epoch = known_epoch = 0;

@@ -12,11 +12,12 @@ namespace ivis::client {
 
 struct NetworkOptions {
   std::string endpoint;
-  SceneHash scene_hash = 0;                 ///< 0: whatever the server has; held to from then on
-  std::string reach;                        ///< of every cell; empty: the server chooses
-  Pace pace;                                ///< what it chooses by
-  std::optional<Strategy> strategy;         ///< none: the server's
-  std::uint32_t budget_us = 0;              ///< of one solve; 0: the server's
+  SceneHash scene_hash = 0;          ///< 0: whatever the server has; held to from then on, unless:
+  bool follow_scene = false;         ///< go on with whatever the server serves later
+  std::string reach;                 ///< of every cell; empty: the server chooses
+  Pace pace;                         ///< what it chooses by
+  std::optional<Strategy> strategy;  ///< none: the server's
+  std::uint32_t budget_us = 0;       ///< of one solve; 0: the server's
   std::chrono::milliseconds silence{2000};  ///< unanswered for so long: greet anew
 };
 

@@ -10,9 +10,10 @@
 //         covered|uncovered <cause> everything
 //   frame ... covered|uncovered <cause> <count> <first id> <gap> <gap> ...
 //   object <id> <flags: 1 removed, 2 occluder off, 4 moved> [<x> <y> <z> <qx> <qy> <qz> <qw>]
-// (a frame is one line; the placement of an object is there when it was moved). Objects that changed
-// come before the frame that first shows them so. The ids are those whose visibility differs from the last frame that listed
-// any, at first from nothing; a gap is the difference to the id before it.
+// (a frame is one line; the placement of an object is there when it was moved). Objects that
+// changed come before the frame that first shows them so. The ids are those whose visibility
+// differs from the last frame that listed any, at first from nothing; a gap is the difference to
+// the id before it.
 
 #include <cstdint>
 #include <filesystem>
@@ -34,9 +35,9 @@ struct RecordedFrame {
   Vec3 wanted{0};              ///< where the observer meant to be
   Vec3 eye{0};                 ///< drawn from; in `cell` when covered, but for an everything
   bool covered = false;
-  bool everything = false;        ///< every object was visible
-  std::uint8_t cause = 0;         ///< ivis_cause: why `wanted` was outside the cell
-  std::vector<ObjectId> changed;  ///< ascending; empty when everything
+  bool everything = false;           ///< every object was visible
+  std::uint8_t cause = 0;            ///< ivis_cause: why `wanted` was outside the cell
+  std::vector<ObjectId> changed;     ///< ascending; empty when everything
   std::vector<ObjectState> edits{};  ///< of the scene since the frame before; speeds are not kept
 };
 

@@ -30,7 +30,8 @@ inline IdBits all_of(std::size_t objects) {
   return bits;
 }
 
-/// What is served: the same for as long as a client lives, but for the reach.
+/// What is served: the same for as long as a client lives, but for the reach; and all of it for one
+/// that follows the server to another scene.
 struct Catalogue {
   SceneHash scene_hash = 0;
   std::vector<Reach> reaches;  ///< what cells may be, ascending
@@ -81,6 +82,7 @@ struct SourceStats {
   std::uint64_t answers = 0;
   std::uint64_t bytes = 0;
   std::uint64_t reconnects = 0;
+  std::uint64_t scenes = 0;  ///< other ones than at first that were taken up
   std::uint64_t bad_messages = 0;
 };
 

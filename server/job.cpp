@@ -44,7 +44,8 @@ ServedScene served_scene(const Scene& scene) {
   return served;
 }
 
-JobDone perform(Job job, const ServedScene& scene) {
+JobDone perform(Job job) {
+  const ServedScene& scene = *job.scene;
   Work work;
   const auto start = std::chrono::steady_clock::now();
   const Result<Pvs> pvs = solve(job, work);

@@ -29,8 +29,10 @@ struct ServedScene {
 ServedScene served_scene(const Scene& scene);
 
 /// The solving and coding of one answer: all that it takes, so that any thread may do it.
+/// Ownership: borrows scene and method.
 struct Job {
   std::string peer;
+  const ServedScene* scene = nullptr;
   ViewCell cell;
   const Method* method = nullptr;
   Effort effort;
@@ -56,6 +58,6 @@ struct JobDone {
 
 /// Never throws: what cannot be solved is answered with every object. Threads: reentrant.
 /// Cost: one solve and one encoding.
-JobDone perform(Job job, const ServedScene& scene);
+JobDone perform(Job job);
 
 }  // namespace ivis::server

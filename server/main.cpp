@@ -31,8 +31,14 @@ enum Exit { kOk = 0, kUsage = 2, kInput = 3, kConnection = 4 };
 std::atomic<bool> stop_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
 
+std::atomic<bool> reload_requested{false};
+
 void request_stop(int) {
   stop_requested.store(true);
+}
+
+void request_reload(int) {
+  reload_requested.store(true);
 }
 
 constexpr const char* kAbout =
@@ -45,6 +51,7 @@ constexpr const char* kMore =
     "  ivisd --scene city.glb --occluders city.ivo --listen tcp://127.0.0.1:7447 &\n"
     "  ivis walk --connect tcp://127.0.0.1:7447 --path walk.csv\n"
     "  kill %1        (bids its clients farewell and exits 0)\n"
+    "  kill -HUP %1   (loads the scene anew and goes on with its clients; edits are forgotten)\n"
     "\n"
     "Every option may also be a key of the --config file (log_level = \"debug\") or a variable of "
     "the\n"
@@ -130,9 +137,9 @@ int check(const Configured& configured) {
 class Builder {
  public:
   Builder(World& world, Ladder& ladder, const WorldOptions& options, Log& log)
-      : thread_([&world, &ladder, &options, &log] {
+      : thread_([this, &world, &ladder, &options, &log] {
           Context quiet;
-          quiet.stop = &stop_requested;
+          quiet.stop = &stop_;
           const Status built = [&]() -> Status {
             try {
               return build_rungs(world, ladder, options, quiet);
@@ -146,13 +153,129 @@ class Builder {
             log.warn("ladder", {{"rungs", ladder.ready()}, {"reason", built.error().message}});
         }) {}
   ~Builder() {
-    stop_requested = true;
+    stop_ = true;
     thread_.join();
   }
   Builder(const Builder&) = delete;
   Builder& operator=(const Builder&) = delete;
 
  private:
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+/// A scene as loaded once, with all that serving it takes.
+struct Generation {
+  std::unique_ptr<World> world;
+  std::unique_ptr<Ladder> ladder;
+  ServedScene served;
+  std::unique_ptr<SceneState> state;
+  CostModel cost;
+  std::unique_ptr<Builder> builder;  ///< last: it uses the others
+
+  Server::Served view() const { return {&served, ladder.get(), cost, state.get()}; }
+};
+
+WorldOptions world_options(const Config& config) {
+  WorldOptions wanted;
+  wanted.scene = config.scene;
+  wanted.occluders = config.occluders;
+  wanted.reach = config.reach;
+  wanted.default_reach = kDefaultReach;
+  wanted.method = config.method;
+  wanted.threads = config.threads;
+  wanted.granularity = config.granularity;
+  return wanted;
+}
+
+/// `wanted`: borrowed by the generation's builder.
+Result<std::unique_ptr<Generation>> load(const Config& config, const WorldOptions& wanted,
+                                         const Context& context, Log& log) {
+  auto made = std::make_unique<Generation>();
+  auto world = load_world(wanted, context);
+  if (!world) return world.error();
+  made->world = std::move(*world);
+  World& w = *made->world;
+  for (const std::string& warning : w.scene.warnings)
+    log.warn("scene", {{"warning", warning}});
+  log.info("loaded", {{"scene", config.scene.string()},
+                      {"objects", w.scene.object_count()},
+                      {"triangles", w.scene.triangle_count},
+                      {"occluders", w.occluders.shrunk.size()},
+                      {"reach", w.reach.to_string()},
+                      {"method", w.method->traits().name}});
+  if (w.scene.object_count() > wire::kMaxObjects)
+    return input_error("'" + config.scene.string() + "' has " +
+                       std::to_string(w.scene.object_count()) +
+                       " objects, more than a message can name");
+  // An occluder file may know more than what is shrunk here (voxels, polyhedra): its ladder has to
+  // be asked for.
+  const bool given = !config.occluders.empty() && config.ladder == "auto";
+  auto reaches = parse_ladder(given ? "none" : config.ladder, w.reach, w.occluders.slack_m);
+  if (!reaches) return reaches.error();
+  made->ladder =
+      std::make_unique<Ladder>(std::move(*reaches), *w.method, w.occluders.slack_m, w.index.get());
+  made->state = std::make_unique<SceneState>(w.scene);
+  made->served = served_scene(w.scene);
+  if (!w.method->keeps_to_effort() && config.strategy != Strategy::kGuaranteed)
+    log.warn("strategy", {{"strategy", to_string(config.strategy)},
+                          {"reason", w.method->traits().name + " keeps to no budget"}});
+  made->cost = calibrate(*w.method, w.scene, w.reach, context.stop);
+  if (w.method->keeps_to_effort() && !(made->cost.draw_ms > 0 && made->cost.test_ms > 0))
+    log.warn("calibrated", {{"reason", "too few places in the scene: budgets may bound nothing"}});
+  else if (w.method->keeps_to_effort())
+    log.info("calibrated", {{"fixed_ms", made->cost.fixed_ms},
+                            {"draw_us", 1e3 * made->cost.draw_ms},
+                            {"test_us", 1e3 * made->cost.test_ms}});
+  return made;
+}
+
+/// Loads the scene anew, beside the server, whenever a signal asks for it.
+class Reloader {
+ public:
+  Reloader(const Config& config, const WorldOptions& wanted, Log& log)
+      : config_(config), wanted_(wanted), log_(log) {}
+  ~Reloader() {
+    if (thread_.joinable()) thread_.join();  // stopped by stop_requested
+  }
+  Reloader(const Reloader&) = delete;
+  Reloader& operator=(const Reloader&) = delete;
+
+  /// What was loaded, once it is; called often, by one thread.
+  std::unique_ptr<Generation> take() {
+    if (thread_.joinable() && !done_) return nullptr;
+    if (thread_.joinable()) {
+      thread_.join();
+      if (loaded_) return std::move(loaded_);
+    }
+    if (!reload_requested.exchange(false)) return nullptr;
+    log_.info("reloading", {{"scene", config_.scene.string()}});
+    done_ = false;
+    thread_ = std::thread([this] { run(); });
+    return nullptr;
+  }
+
+ private:
+  void run() {
+    Context quiet;
+    quiet.stop = &stop_requested;
+    try {
+      auto made = load(config_, wanted_, quiet, log_);
+      if (made)
+        loaded_ = std::move(*made);
+      else if (made.error().code != ErrorCode::kCancelled)
+        log_.error("reload_failed", {{"reason", made.error().message}});
+    } catch (const std::exception& e) {  // out of memory: the old one goes on
+      log_.error("reload_failed", {{"reason", e.what()}});
+    }
+    done_ = true;
+  }
+
+  const Config& config_;
+  const WorldOptions& wanted_;
+  Log& log_;
+  std::unique_ptr<Generation> loaded_;
+  std::atomic<bool> done_{false};
   std::thread thread_;
 };
 
@@ -163,42 +286,13 @@ int serve(const Config& config) {
     report(free.error());
     return kConnection;
   }
-  WorldOptions wanted;
-  wanted.scene = config.scene;
-  wanted.occluders = config.occluders;
-  wanted.reach = config.reach;
-  wanted.default_reach = kDefaultReach;
-  wanted.method = config.method;
-  wanted.threads = config.threads;
-  wanted.granularity = config.granularity;
-  const Context context = shown_progress(log);
-  auto world = load_world(wanted, context);
-  if (!world) {
-    if (world.error().code == ErrorCode::kCancelled) return kOk;
-    return report(world.error());
+  const WorldOptions wanted = world_options(config);
+  auto loaded = load(config, wanted, shown_progress(log), log);
+  if (!loaded) {
+    if (loaded.error().code == ErrorCode::kCancelled) return kOk;
+    return report(loaded.error());
   }
-  World& w = **world;
-  for (const std::string& warning : w.scene.warnings)
-    log.warn("scene", {{"warning", warning}});
-  log.info("loaded", {{"scene", config.scene.string()},
-                      {"objects", w.scene.object_count()},
-                      {"triangles", w.scene.triangle_count},
-                      {"occluders", w.occluders.shrunk.size()},
-                      {"reach", w.reach.to_string()},
-                      {"method", w.method->traits().name}});
-
-  if (w.scene.object_count() > wire::kMaxObjects)
-    return report(input_error("'" + config.scene.string() + "' has " +
-                              std::to_string(w.scene.object_count()) +
-                              " objects, more than a message can name"));
-  // An occluder file may know more than what is shrunk here (voxels, polyhedra): its ladder has to
-  // be asked for.
-  const bool given = !config.occluders.empty() && config.ladder == "auto";
-  auto reaches = parse_ladder(given ? "none" : config.ladder, w.reach, w.occluders.slack_m);
-  if (!reaches) return report(reaches.error());
-  Ladder ladder(std::move(*reaches), *w.method, w.occluders.slack_m, w.index.get());
-  SceneState state(w.scene);
-  const ServedScene served = served_scene(w.scene);
+  std::unique_ptr<Generation> generation = std::move(*loaded);
   ServerOptions options;
   options.listen = config.listen;
   options.busy_poll = config.busy_poll;
@@ -211,26 +305,27 @@ int serve(const Config& config) {
   options.limits.least_solve = std::chrono::milliseconds(config.least_solve_ms);
   options.limits.strategy = config.strategy;
   options.limits.budget_ms = config.budget_us / 1000.0;
-  if (!w.method->keeps_to_effort() && config.strategy != Strategy::kGuaranteed)
-    log.warn("strategy", {{"strategy", to_string(config.strategy)},
-                          {"reason", w.method->traits().name + " keeps to no budget"}});
-  const CostModel cost = calibrate(*w.method, w.scene, w.reach, &stop_requested);
-  if (w.method->keeps_to_effort() && !(cost.draw_ms > 0 && cost.test_ms > 0))
-    log.warn("calibrated", {{"reason", "too few places in the scene: budgets may bound nothing"}});
-  else if (w.method->keeps_to_effort())
-    log.info("calibrated", {{"fixed_ms", cost.fixed_ms},
-                            {"draw_us", 1e3 * cost.draw_ms},
-                            {"test_us", 1e3 * cost.test_ms}});
-  auto server = Server::bind(options, served, ladder, log, cost, &state);
+  auto server = Server::bind(options, generation->view(), log);
   if (!server) {
     report(server.error());
     return kConnection;
   }
   log.info("listening", {{"address", (*server)->endpoint()}});
-  {
-    const Builder builder(w, ladder, wanted, log);
-    (*server)->run(stop_requested);
-  }
+  const auto build = [&](Generation& g) {
+    g.builder = std::make_unique<Builder>(*g.world, *g.ladder, wanted, log);
+  };
+  build(*generation);
+  Reloader reloader(config, wanted, log);
+  std::unique_ptr<Generation> before;
+  (*server)->run(stop_requested, [&]() -> std::optional<Server::Served> {
+    before.reset();  // the server has let go of it
+    auto next = reloader.take();
+    if (!next) return std::nullopt;
+    before = std::exchange(generation, std::move(next));
+    build(*generation);
+    log.info("reloaded", {{"objects", generation->served.objects()}});
+    return generation->view();
+  });
   return kOk;
 }
 
@@ -253,5 +348,7 @@ int main(int argc, char** argv) {
   action.sa_handler = request_stop;
   sigaction(SIGTERM, &action, nullptr);
   sigaction(SIGINT, &action, nullptr);
+  action.sa_handler = request_reload;
+  sigaction(SIGHUP, &action, nullptr);
   return serve(configured->config);
 }

@@ -43,12 +43,11 @@ Error explain(const zmq::error_t& e, const std::string& listen) {
 }  // namespace
 
 struct Server::Impl {
-  Impl(const ServerOptions& o, const ServedScene& scene, const Ladder& ladder, Log& l,
-       const CostModel& cost, SceneState* state)
+  Impl(const ServerOptions& o, const Served& served, Log& l)
       : options(o),
         log(l),
-        sessions(scene, ladder, o.limits, cost, state),
-        workers(scene, std::max(1U, o.workers)),
+        sessions(*served.scene, *served.ladder, o.limits, served.cost, served.state),
+        workers(std::max(1U, o.workers)),
         context(1),
         socket(context, zmq::socket_type::router) {}
 
@@ -114,6 +113,18 @@ struct Server::Impl {
     }
   }
 
+  void replace(const Served& served) {
+    while (workers.under_way() > 0) {  // they borrow what was served
+      zmq::pollitem_t item{nullptr, workers.fd(), ZMQ_POLLIN, 0};
+      zmq::poll(&item, 1, kLookAtStop);
+      for (JobDone& done : workers.take())
+        if (const auto out = sessions.finish(std::move(done))) send(*out);
+    }
+    for (const Outgoing& out :
+         sessions.replace(*served.scene, *served.ladder, served.cost, served.state))
+      send(out);
+  }
+
   void turn() {
     const bool spin = options.busy_poll || (sessions.work_waiting() && workers.free());
     zmq::pollitem_t items[] = {{socket.handle(), 0, ZMQ_POLLIN, 0},
@@ -164,12 +175,11 @@ const SessionCounters& Server::counters() const {
   return impl_->sessions.counters();
 }
 
-Result<std::unique_ptr<Server>> Server::bind(const ServerOptions& options, const ServedScene& scene,
-                                             const Ladder& ladder, Log& log, const CostModel& cost,
-                                             SceneState* state) {
+Result<std::unique_ptr<Server>> Server::bind(const ServerOptions& options, const Served& served,
+                                             Log& log) {
   if (auto claimed = claim_address(options.listen); !claimed) return claimed.error();
   try {
-    auto impl = std::make_unique<Impl>(options, scene, ladder, log, cost, state);
+    auto impl = std::make_unique<Impl>(options, served, log);
     impl->configure();
     impl->socket.bind(options.listen);
     impl->endpoint = plain_endpoint(impl->socket.get(zmq::sockopt::last_endpoint));
@@ -195,10 +205,12 @@ Status probe_address(const std::string& listen) {
   }
 }
 
-void Server::run(const std::atomic<bool>& stop) {
+void Server::run(const std::atomic<bool>& stop,
+                 const std::function<std::optional<Served>()>& other) {
   Impl& s = *impl_;
   while (!stop.load(std::memory_order_relaxed)) {
     try {
+      if (const auto served = other()) s.replace(*served);
       s.turn();
     } catch (const zmq::error_t& e) {
       if (e.num() == EINTR) continue;  // a signal: look at `stop`

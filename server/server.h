@@ -1,7 +1,9 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "core/result.h"
@@ -27,13 +29,18 @@ Status probe_address(const std::string& listen);
 /// handler. Ownership: borrows scene, ladder and log.
 class Server {
  public:
+  /// What is served; borrowed.
+  struct Served {
+    const ServedScene* scene = nullptr;
+    const Ladder* ladder = nullptr;
+    CostModel cost;
+    SceneState* state = nullptr;  ///< null: no edits
+  };
   /// Errors: kConnection when the address is taken by a live server or cannot be had;
   /// kInvalidArgument for one that is not an address. An ipc path that a dead server left behind is
   /// taken over.
-  static Result<std::unique_ptr<Server>> bind(const ServerOptions& options,
-                                              const ServedScene& scene, const Ladder& ladder,
-                                              Log& log, const CostModel& cost = {},
-                                              SceneState* state = nullptr);
+  static Result<std::unique_ptr<Server>> bind(const ServerOptions& options, const Served& served,
+                                              Log& log);
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -42,7 +49,11 @@ class Server {
   const std::string& endpoint() const;
   /// Serves until `stop` is set (looked at ten times a second and after every signal), then bids
   /// every client farewell, sends what is queued, and gives the address back.
-  void run(const std::atomic<bool>& stop);
+  /// `other`: asked as often; what it gives is served from then on, and what was before is not
+  /// touched any more.
+  void run(
+      const std::atomic<bool>& stop,
+      const std::function<std::optional<Served>()>& other = [] { return std::optional<Served>(); });
   const SessionCounters& counters() const;
 
  private:

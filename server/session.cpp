@@ -53,8 +53,8 @@ std::string why_another(const ServedScene& scene, SceneHash hash) {
 
 SessionTable::SessionTable(const ServedScene& scene, const Ladder& ladder, SessionLimits limits,
                            const CostModel& cost, SceneState* state)
-    : scene_(scene),
-      ladder_(ladder),
+    : scene_(&scene),
+      ladder_(&ladder),
       limits_(limits),
       cost_(cost),
       state_(state),
@@ -88,11 +88,11 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
     return turn_away(wire::Refusal::kVersion, "the client speaks version " +
                                                   std::to_string(hello.version) + ", the server " +
                                                   std::to_string(wire::kProtocolVersion));
-  if (hello.scene_hash != 0 && hello.scene_hash != scene_.hash)
+  if (hello.scene_hash != 0 && hello.scene_hash != scene_->hash)
     return turn_away(wire::Refusal::kScene, "the client's scene has the hash " +
                                                 to_hex(hello.scene_hash) + ", the server's " +
-                                                to_hex(scene_.hash) +
-                                                why_another(scene_, hello.scene_hash));
+                                                to_hex(scene_->hash) +
+                                                why_another(*scene_, hello.scene_hash));
   Session session;
   session.pace = hello.pace;
   session.effort = cost_.effort(hello.strategy.value_or(limits_.strategy),
@@ -100,10 +100,10 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
   if (!hello.reach.empty()) {
     const auto wanted = Reach::parse(hello.reach);
     if (!wanted) return turn_away(wire::Refusal::kReach, wanted.error().message);
-    if (!serves(ladder_.largest(), ladder_.slack_m(), *wanted))
+    if (!serves(ladder_->largest(), ladder_->slack_m(), *wanted))
       return turn_away(wire::Refusal::kReach, "the client wants " + wanted->to_string() +
                                                   ", the server's occluders serve up to " +
-                                                  ladder_.largest().to_string());
+                                                  ladder_->largest().to_string());
     session.reach = *wanted;
   }
   if (known == sessions_.end() && sessions_.size() >= limits_.max_sessions)
@@ -165,9 +165,9 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
   SceneState::Outcome outcome;
   if (!limits_.edits)
     outcome.why = "this server takes no edits (ivisd --edits on)";
-  else if (state_ == nullptr || ladder_.largest_index() == nullptr ||
-           !ladder_.largest_method().takes_amendments())
-    outcome.why = "the method " + ladder_.largest_method().traits().name + " takes no edits";
+  else if (state_ == nullptr || ladder_->largest_index() == nullptr ||
+           !ladder_->largest_method().takes_amendments())
+    outcome.why = "the method " + ladder_->largest_method().traits().name + " takes no edits";
   else
     outcome = state_->apply(edit.edits, now);
   if (outcome.epoch != 0)
@@ -270,7 +270,7 @@ std::optional<Outgoing> SessionTable::finish(JobDone done) {
 std::optional<Outgoing> SessionTable::work(Time now) {
   Next step = next(now);
   if (auto* out = std::get_if<Outgoing>(&step)) return std::move(*out);
-  if (auto* job = std::get_if<Job>(&step)) return finish(perform(std::move(*job), scene_));
+  if (auto* job = std::get_if<Job>(&step)) return finish(perform(std::move(*job)));
   return std::nullopt;
 }
 
@@ -279,27 +279,28 @@ std::vector<std::byte> SessionTable::welcome(Session& session) {
   ++counters_.welcomed;
   wire::Welcome w;
   w.session = session.id;
-  w.scene_hash = scene_.hash;
-  w.order_hash = scene_.order_hash;
-  w.objects = scene_.objects();
+  w.scene_hash = scene_->hash;
+  w.order_hash = scene_->order_hash;
+  w.objects = scene_->objects();
   if (session.reach) {
     w.reaches.push_back(session.reach->to_string());
   } else {
-    for (const Reach& r : ladder_.reaches())
+    for (const Reach& r : ladder_->reaches())
       w.reaches.push_back(r.to_string());
   }
-  w.method = ladder_.largest_method().traits().name;
+  w.method = ladder_->largest_method().traits().name;
   if (!session.table_wanted) return wire::encode(w);
-  return wire::encode(w, scene_.packed_table);
+  return wire::encode(w, scene_->packed_table);
 }
 
 Ladder::Choice SessionTable::choose(const Session& session, std::uint32_t hold_us) const {
   // A named reach always by the same occluders: equal poses get equal sets.
   if (session.reach)
-    return {0, &ladder_.largest_method(), ladder_.largest_index(),
-            session.pace.told() ? ladder_.safe_part(*session.reach, reach_of(session.pace, hold_us))
-                                : 1};
-  return ladder_.choose(session.pace, hold_us);
+    return {0, &ladder_->largest_method(), ladder_->largest_index(),
+            session.pace.told()
+                ? ladder_->safe_part(*session.reach, reach_of(session.pace, hold_us))
+                : 1};
+  return ladder_->choose(session.pace, hold_us);
 }
 
 Job SessionTable::answer(Peers::value_type& peer, Time now) {
@@ -317,7 +318,8 @@ Job SessionTable::answer(Peers::value_type& peer, Time now) {
   if (choice.safe < 1) ++counters_.beyond_ladder;
   Job job;
   job.peer = peer.first;
-  job.cell = {pose.eye, session.reach ? *session.reach : ladder_.reaches()[choice.rung]};
+  job.scene = scene_;
+  job.cell = {pose.eye, session.reach ? *session.reach : ladder_->reaches()[choice.rung]};
   job.method = choice.method;
   job.effort = session.effort;
   job.least_solve = limits_.least_solve;
@@ -362,7 +364,8 @@ void SessionTable::add_changes(const Ladder::Choice& choice, const wire::PoseMes
 
 std::size_t SessionTable::remembered_limit() const {
   // A state holds two sets (wire/pvs_codec.h) and the model.
-  const std::size_t each = sizeof(Remembered) + std::size_t{2} * ((scene_.objects() + 63) / 64) * 8;
+  const std::size_t each =
+      sizeof(Remembered) + std::size_t{2} * ((scene_->objects() + 63) / 64) * 8;
   return std::max<std::size_t>(2,
                                std::min(limits_.remembered_sets, limits_.remembered_bytes / each));
 }
@@ -394,13 +397,28 @@ std::size_t SessionTable::expire(Time now) {
   return silent.size();
 }
 
-std::vector<Outgoing> SessionTable::close() {
-  std::vector<Outgoing> farewells;
+std::vector<Outgoing> SessionTable::end_all(wire::Refusal reason, const std::string& text) {
+  std::vector<Outgoing> out;
   for (const auto& [peer, session] : sessions_)
-    farewells.push_back(refuse(peer, session.id, wire::Refusal::kClosing, "the server is closing"));
+    out.push_back(refuse(peer, session.id, reason, text));
   sessions_.clear();
   waiting_.clear();
-  return farewells;
+  return out;
+}
+
+std::vector<Outgoing> SessionTable::replace(const ServedScene& scene, const Ladder& ladder,
+                                            const CostModel& cost, SceneState* state) {
+  auto out = end_all(wire::Refusal::kSession, "the scene was loaded anew: say Hello again");
+  scene_ = &scene;
+  ladder_ = &ladder;
+  cost_ = cost;
+  state_ = state;
+  noticed_epoch_ = 0;
+  return out;
+}
+
+std::vector<Outgoing> SessionTable::close() {
+  return end_all(wire::Refusal::kClosing, "the server is closing");
 }
 
 }  // namespace ivis::server

@@ -101,6 +101,10 @@ class SessionTable {
   void forget(std::string_view peer);
   /// Ends sessions that said nothing for limits.idle. Returns how many.
   std::size_t expire(Time now);
+  /// Serves another scene from now on; its sessions end, and the clients are told to begin new
+  /// ones. No job may be under way. Borrows as the constructor.
+  std::vector<Outgoing> replace(const ServedScene& scene, const Ladder& ladder,
+                                const CostModel& cost, SceneState* state);
   /// A farewell to every client; no session is left.
   std::vector<Outgoing> close();
 
@@ -140,6 +144,7 @@ class SessionTable {
   std::optional<Outgoing> handle(std::string_view peer, const wire::PaceMessage& pace, Time now);
   std::optional<Outgoing> handle(std::string_view peer, const wire::EditMessage& edit, Time now);
   std::optional<Outgoing> handle(std::string_view peer, const wire::Bye& bye);
+  std::vector<Outgoing> end_all(wire::Refusal reason, const std::string& text);
   /// The peer's session if it is the one named, else null.
   Session* find(std::string_view peer, std::uint64_t id);
   Outgoing refuse_unknown(std::string_view peer, std::uint64_t session);
@@ -158,8 +163,8 @@ class SessionTable {
   void enqueue(Peers::value_type& peer);
   std::size_t remembered_limit() const;
 
-  const ServedScene& scene_;
-  const Ladder& ladder_;
+  const ServedScene* scene_;
+  const Ladder* ladder_;
   SessionLimits limits_;
   CostModel cost_;
   SceneState* state_;

@@ -10,8 +10,7 @@
 
 namespace ivis::server {
 
-Workers::Workers(const ServedScene& scene, unsigned threads)
-    : scene_(scene), fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+Workers::Workers(unsigned threads) : fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
   if (fd_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
   for (unsigned i = 0; i < threads; ++i)
     threads_.emplace_back([this] { run(); });
@@ -53,7 +52,7 @@ void Workers::run() {
     Job job = std::move(jobs_.front());
     jobs_.pop_front();
     lock.unlock();
-    JobDone done = perform(std::move(job), scene_);
+    JobDone done = perform(std::move(job));
     lock.lock();
     done_.push_back(std::move(done));
     const std::uint64_t one = 1;

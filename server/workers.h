@@ -11,12 +11,12 @@
 namespace ivis::server {
 
 /// Threads that perform jobs, each one at a time, in the order given. The owner waits for fd() to
-/// be readable together with its socket. Threads: give() and take() from one thread. Ownership:
-/// borrows the scene. The destructor waits for the jobs under way and drops the rest.
+/// be readable together with its socket. Threads: give() and take() from one thread. The
+/// destructor waits for the jobs under way and drops the rest.
 class Workers {
  public:
   /// Throws std::system_error when the system gives no thread or descriptor.
-  Workers(const ServedScene& scene, unsigned threads);
+  explicit Workers(unsigned threads);
   ~Workers();
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
@@ -32,7 +32,6 @@ class Workers {
  private:
   void run();
 
-  const ServedScene& scene_;
   int fd_;
   std::mutex mutex_;
   std::condition_variable given_;

@@ -390,6 +390,109 @@ TEST_F(ClientOverTcp, AnEditWithoutAnAnswerIsToldToBeLost) {
   EXPECT_EQ(ivis_client_edit(client.get(), &e, 1, nullptr), IVIS_ERROR_CONNECTION);
 }
 
+/// A server that is made to serve another scene while it runs.
+class Replaced {
+ public:
+  Replaced(const Scene& first, const Scene& second)
+      : methods_{NearMethod(first), NearMethod(second)}, log_(server::LogLevel::kOff, false) {
+    const Scene* scenes[]{&first, &second};
+    for (int i = 0; i < 2; ++i) {
+      served_[i] = server::served_scene(*scenes[i]);
+      ladders_[i] = std::make_unique<server::Ladder>(Reach::cylinder(1.5, 0.1), methods_[i], 0.001,
+                                                     &no_occluders());
+      states_[i] = std::make_unique<server::SceneState>(*scenes[i]);
+    }
+    server::ServerOptions options;
+    options.listen = "tcp://127.0.0.1:*";
+    auto bound = server::Server::bind(options, view(0), log_);
+    EXPECT_TRUE(bound);
+    server_ = std::move(*bound);
+    thread_ = std::thread([this] {
+      server_->run(stop_, [this]() -> std::optional<server::Server::Served> {
+        if (!replace_.exchange(false)) return std::nullopt;
+        return view(1);
+      });
+    });
+  }
+  ~Replaced() {
+    stop_ = true;
+    thread_.join();
+  }
+  void replace() { replace_ = true; }
+  std::string endpoint() const { return server_->endpoint(); }
+
+ private:
+  server::Server::Served view(int i) const {
+    return {&served_[i], ladders_[i].get(), {}, states_[i].get()};
+  }
+  NearMethod methods_[2];
+  server::ServedScene served_[2];
+  std::unique_ptr<server::Ladder> ladders_[2];
+  std::unique_ptr<server::SceneState> states_[2];
+  server::Log log_;
+  std::unique_ptr<server::Server> server_;
+  std::atomic<bool> stop_{false}, replace_{false};
+  std::thread thread_;
+};
+
+/// Poses until a PVS of a session begun after the first is in use; false if there is none.
+bool goes_on(VisibilityClient& client, const double (&eye)[3]) {
+  for (int i = 0; i < kWait; ++i) {
+    const PvsView view = client.frame(eye);
+    if (client.status() != IVIS_OK) return false;
+    const ivis_stats stats = client.stats();
+    if (stats.reconnects > 0 && view.covered() && !view.everything() &&
+        client.wait(kWait) == IVIS_OK)
+      return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return false;
+}
+
+TEST_F(ClientOverTcp, TheSameSceneLoadedAnewGoesOnWithoutTheEdits) {
+  Replaced server(scene, scene);
+  auto client = connect(server.endpoint());
+  const double eye[3]{10, 1.7, 10};
+  const ivis_edit e = an_edit(IVIS_EDIT_REMOVE, 105);
+  ASSERT_EQ(ivis_client_edit(client.get(), &e, 1, nullptr), IVIS_OK);
+  EXPECT_EQ(result_of(client).epoch, 1U);
+  client.pose(eye);
+  look_until(client, eye, 1);
+  server.replace();
+  ASSERT_TRUE(goes_on(client, eye)) << client.error();
+  EXPECT_EQ(ids(client.view(eye)), solved(method, eye));
+  EXPECT_EQ(client.view(eye).raw().epoch, 0U);
+}
+
+TEST_F(ClientOverTcp, AnotherSceneIsFollowedByThoseThatSaidSo) {
+  const Scene other = grid_scene(31);
+  const NearMethod other_method(other);
+  Replaced server(scene, other);
+  auto holding = connect(server.endpoint());
+  ivis_client_options options = ivis_client_options_default();
+  const std::string endpoint = server.endpoint();
+  options.endpoint = endpoint.c_str();
+  options.follow_scene = 1;
+  auto following = VisibilityClient::connect(options);
+  ASSERT_TRUE(following);
+  const double eye[3]{10, 1.7, 10};
+  for (VisibilityClient* c : {&holding, &following}) {
+    c->pose(eye);
+    ASSERT_EQ(c->wait(kWait), IVIS_OK);
+    EXPECT_EQ(c->view(eye).raw().scene_hash, scene.hash);
+  }
+  server.replace();
+  ASSERT_TRUE(goes_on(following, eye)) << following.error();
+  const PvsView view = following.view(eye);
+  EXPECT_EQ(view.raw().scene_hash, other.hash);
+  EXPECT_EQ(view.object_count(), 31U * 31);
+  EXPECT_EQ(ids(view), solved(other_method, eye));
+  EXPECT_FALSE(goes_on(holding, eye));
+  EXPECT_EQ(holding.status(), IVIS_ERROR_MISMATCH);
+  options.scene_hash = scene.hash;
+  EXPECT_FALSE(VisibilityClient::connect(options)) << "follow_scene with a scene_hash";
+}
+
 TEST(Client, AnAbsentServerIsAConnectionErrorThatNamesTheEndpoint) {
   ivis_client_options options = ivis_client_options_default();
   options.endpoint = "tcp://127.0.0.1:1";

@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
   ivis::server::Log log(ivis::server::LogLevel::kInfo, false);
   ivis::server::ServerOptions options;
   options.listen = argv[1];
-  auto server = ivis::server::Server::bind(options, served, ladder, log);
+  auto server = ivis::server::Server::bind(options, {&served, &ladder, {}, nullptr}, log);
   if (!server) {
     std::fprintf(stderr, "%s\n", server.error().message.c_str());
     return 4;

@@ -39,7 +39,7 @@ class RunningServer {
     options.listen = listen;
     options.limits = limits;
     options.workers = workers;
-    auto bound = server::Server::bind(options, served_, *ladder_, log_, {}, &state_);
+    auto bound = server::Server::bind(options, {&served_, ladder_.get(), {}, &state_}, log_);
     if (!bound) {
       ADD_FAILURE() << bound.error().message;
       return;

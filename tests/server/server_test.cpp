@@ -202,7 +202,7 @@ class Address : public ServerSocket {
   Error bind_error(const std::string& listen) {
     server::ServerOptions options;
     options.listen = listen;
-    const auto s = server::Server::bind(options, served, ladder, log);
+    const auto s = server::Server::bind(options, {&served, &ladder, {}, nullptr}, log);
     const auto probed = server::probe_address(listen);
     EXPECT_FALSE(s) << listen;
     EXPECT_FALSE(probed) << listen;

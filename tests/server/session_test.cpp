@@ -292,7 +292,7 @@ TEST_F(Sessions, AnAnswerUnderWayIsLostWithItsSession) {
   ASSERT_TRUE(std::holds_alternative<server::Job>(step));
   pose(a, 2, {5, 1, 4});
   EXPECT_FALSE(table().work_waiting()) << "one job of a client at a time";
-  auto done = server::perform(std::move(std::get<server::Job>(step)), served);
+  auto done = server::perform(std::move(std::get<server::Job>(step)));
   const auto again = server::JobDone(done);
   ASSERT_TRUE(table().finish(std::move(done)));
   EXPECT_TRUE(table().work_waiting());
@@ -582,7 +582,7 @@ TEST_F(Edits, AnAnswerUnderWayIsOfTheSceneItWasBegunFor) {
   pose(a, 1, {4, 1, 4});
   auto step = table().next(now);
   edit(a, {{EditKind::kRemove, 27, {}, 0}});
-  const auto out = table().finish(server::perform(std::move(std::get<server::Job>(step)), served));
+  const auto out = table().finish(server::perform(std::move(std::get<server::Job>(step))));
   ASSERT_TRUE(out);
   const auto m = std::get<wire::PvsMessage>(decoded(*out, "a"));
   EXPECT_EQ(m.changes.epoch, 1U);

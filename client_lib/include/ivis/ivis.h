@@ -90,6 +90,9 @@ typedef struct ivis_client_options {
   uint32_t budget_us;     /* of one solve; 0: the server's */
   uint32_t linger_frames; /* objects are drawn for so many frames, at most 3600, after they left
                               the set */
+  uint8_t follow_scene;   /* 1: when the server loads another scene, go on with that: everything is
+                             visible until its first PVS is there; see ivis_frame.scene_hash. 0: that
+                             is a MISMATCH for good. Not with a scene_hash */
 } ivis_client_options;
 
 /* tcp://127.0.0.1:7447, any scene, the server's largest reach, EVERYTHING, 5000 ms, 2000 ms, no
@@ -141,6 +144,8 @@ typedef struct ivis_frame {
                              cells; 0 outside and without one */
   double safe;            /* the part of the pace that cells hold, 0 to 1; 1 while not known */
   uint32_t epoch;         /* of the scene to draw: see ivis_client_changes(); 0: as in the file */
+  uint64_t scene_hash;    /* that the ids are of; 0 until the server has been met. Another than
+                             before only with ivis_client_options.follow_scene */
   const uint64_t* visible_bits; /* bit (id & 63) of word (id >> 6); valid until the next call with
                                    this client, NULL while object_count is 0 */
 } ivis_frame;
