@@ -201,7 +201,7 @@ ivis_status ivis_client_edit(ivis_client* client, const ivis_edit* edits, size_t
         if (!edit.placement.valid() || !(e.speed_m_s >= 0 && e.speed_m_s <= ivis::kFastestMoverMs))
           return client->fail(IVIS_ERROR_ARGUMENT,
                               "object " + std::to_string(e.id) +
-                                  ": a position beyond 1e6 m, a rotation that is no unit "
+                                  ": a position beyond 1e9 m, a rotation that is no unit "
                                   "quaternion, or a speed not from 0 to 1000 m/s");
       }
       wanted.push_back(edit);

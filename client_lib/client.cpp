@@ -129,6 +129,7 @@ void ivis_client::take() {
     leave_scene();
   }
   if (!any || answer_.sequence == 0) return;
+  session_ = source_->stats().reconnects;
   note_changes();
   stats_.last_solve_ms = answer_.solve_ms;
   cell_reach_ = answer_.cell.reach.to_string();
@@ -169,7 +170,7 @@ bool ivis_client::expired(Time now) const {
 /// Is nothing under way that would bring the scene as it is now?
 bool ivis_client::wants_another(Time now) const {
   if (answer_.sequence == 0 || answer_.sequence != sequence_) return false;
-  if (source_->epoch() > answer_.epoch) return true;
+  if (source_->epoch() > answer_.epoch || source_->stats().reconnects != session_) return true;
   const Sent* s = sent(answer_.sequence);
   return answer_.valid_us != 0 &&
          (s == nullptr || now - s->at > std::chrono::microseconds(answer_.valid_us / 2));
@@ -274,10 +275,8 @@ ivis_cause ivis_client::why_outside(const Vec3& eye, Time now) const {
 ivis_status ivis_client::view(const Vec3& eye, ivis_frame& out) {
   take();
   const Time now = options_.now();
-  if (finite(eye) && wants_another(now)) {
-    if (const ivis_status posed = pose(eye); posed != IVIS_OK) return posed;
-  }
   changes_.clear();
+  if (finite(eye) && wants_another(now)) static_cast<void>(pose(eye));
   for (const auto& [id, state] : untold_)
     changes_.push_back(told(state));
   untold_.clear();
@@ -314,13 +313,15 @@ ivis_status ivis_client::view(const Vec3& eye, ivis_frame& out) {
     out.cause = static_cast<std::uint8_t>(why_outside(eye, now));
     ++stats_.causes[out.cause];
   }
-  if (sound && has_pvs && !inside && options_.policy == IVIS_POLICY_STALL) {
+  // What ran out on its way here was never drawn by: what moves is held where it was under another.
+  if (fresh) too_late_ = expired(now);
+  if (sound && has_pvs && !inside && !too_late_ && options_.policy == IVIS_POLICY_STALL) {
     const Vec3 held = ivis::client::clamp_to_cell(answer_.cell, eye);
     put(held, out.eye);
     out.stalled = 1;
     ++stats_.stalls;
     stats_.held_m += glm::distance(held, eye);
-    covered = use_pvs = true;  // clamp_to_cell() promises it
+    covered = use_pvs = true;  // clamp_to_cell() promises it; and in time, that movers are held
   }
   if (sound && has_pvs && !inside && options_.policy == IVIS_POLICY_INCOMPLETE) use_pvs = true;
   if (!covered) ++stats_.uncovered_frames;

@@ -76,7 +76,9 @@ struct ivis_client {
   std::string cell_reach_;
   Time met_{};  ///< when the present session was first noticed
   ivis::client::Answer answer_;
-  std::uint64_t scenes_ = 0;                            ///< SourceStats::scenes when last looked at
+  std::uint64_t session_ = 0;  ///< SourceStats::reconnects when answer_ came
+  bool too_late_ = false;      ///< answer_ had expired when it was first looked at
+  std::uint64_t scenes_ = 0;   ///< SourceStats::scenes when last looked at
   std::map<ivis::ObjectId, ivis::ObjectState> states_;  ///< of objects not as in the file
   std::map<ivis::ObjectId, ivis::ObjectState> untold_;  ///< changes since the last view
   std::vector<ivis_object_state> changes_;

@@ -13,16 +13,17 @@ namespace ivis {
 /// origin at `position`.
 struct Placement {
   Vec3 position{0};
-  glm::fquat rotation{1, 0, 0, 0};  ///< unit; a value both ends agree on to the last bit
+  /// Unit, to within rounding; whoever uses it normalises it in double precision.
+  glm::fquat rotation{1, 0, 0, 0};
   bool operator==(const Placement&) const = default;
   bool valid() const {
     const double length =
         std::sqrt(double{rotation.x} * rotation.x + double{rotation.y} * rotation.y +
                   double{rotation.z} * rotation.z + double{rotation.w} * rotation.w);
     return std::abs(position.x) <= kFarthestM && std::abs(position.y) <= kFarthestM &&
-           std::abs(position.z) <= kFarthestM && std::abs(length - 1) <= 1e-3;
+           std::abs(position.z) <= kFarthestM && std::abs(length - 1) <= 2e-6;
   }
-  static constexpr double kFarthestM = 1e6;
+  static constexpr double kFarthestM = 1e9;
 };
 
 /// An object that was changed, as it is now.
@@ -30,7 +31,7 @@ struct ObjectState {
   ObjectId id = 0;
   bool removed = false;
   bool occluder_off = false;  ///< hides nothing, is drawn all the same
-  bool moved = false;         ///< `placement` counts; else it is where the scene file has it
+  bool moved = false;         ///< `placement` counts: it was put somewhere, or moves by itself
   Placement placement;
   float speed_m_s = 0;  ///< of what moves by itself: at most
   bool operator==(const ObjectState&) const = default;

@@ -40,16 +40,12 @@ bool all_opaque(const Mesh& mesh) {
                      [](const Primitive& p) { return p.opaque || p.triangles == 0; });
 }
 
-struct Found {
-  Triangle triangle;
-  double twice;
-};
-
-/// The object's triangles, if all may be ground.
-bool find_flat(const Scene& scene, const Object& object, std::vector<Found>& found) {
+/// Gives the object's triangles, and twice their signed projected areas, to `take`, if all may be
+/// ground so far; returns whether all may.
+template <class F>
+bool find_flat(const Scene& scene, const Object& object, const F& take) {
   const Mesh& mesh = scene.mesh_of(object);
   if (object.always_visible || mesh.triangles() == 0 || !all_opaque(mesh)) return false;
-  found.clear();
   // A mirroring transform turns the winding round.
   const double up = glm::determinant(glm::dmat3(object.to_world)) < 0 ? 1 : -1;
   double twice_sum = 0;
@@ -63,12 +59,12 @@ bool find_flat(const Scene& scene, const Object& object, std::vector<Found>& fou
       const double twice = twice_area(tri.a, tri.b, tri.c);
       if (steep(tri.a, tri.b, tri.c, twice) || (one_side && twice * up <= 0)) return false;
       twice_sum += std::abs(twice);
-      found.push_back({tri, twice});
+      take(tri, twice);
     }
   }
   // What covers more than its own rectangle lies over itself: a closed thing, a tree's crown.
   const Vec3 size = object.bounds.size();
-  return !(twice_sum > 2 * size.x * size.z * (1 + kAreaTolerance));
+  return twice_sum <= 2 * size.x * size.z * (1 + kAreaTolerance);
 }
 
 class SoupBuilder {
@@ -82,7 +78,9 @@ class SoupBuilder {
 
  private:
   void add(std::uint32_t index) {
-    if (!find_flat(scene_, sources(scene_)[index], found_)) return;
+    found_.clear();
+    const auto keep = [&](const Triangle& t, double twice) { found_.push_back({t, twice}); };
+    if (!find_flat(scene_, sources(scene_)[index], keep)) return;
     for (const Found& f : found_) {
       soup_.triangles.push_back({corner(f.triangle.a), corner(f.triangle.b), corner(f.triangle.c)});
       soup_.twice.push_back(f.twice);
@@ -96,6 +94,10 @@ class SoupBuilder {
     return it->second;
   }
 
+  struct Found {
+    Triangle triangle;
+    double twice;
+  };
   const Scene& scene_;
   Soup soup_;
   std::vector<Found> found_;
@@ -135,8 +137,8 @@ class Pieces {
 }  // namespace
 
 bool may_be_ground(const Scene& scene, const Object& object) {
-  std::vector<Found> found;
-  return find_flat(scene, object, found) && !found.empty();
+  bool any = false;
+  return find_flat(scene, object, [&](const Triangle&, double) { any = true; }) && any;
 }
 
 Soup ground_soup(const Scene& scene, bool occluders_only) {

@@ -15,6 +15,11 @@ namespace {
 
 Result<Pvs> solve(const Job& job, Work& done) {
   try {
+    if (job.everything) {
+      Pvs pvs;
+      pvs.everything_because = "the client is far behind";
+      return pvs;
+    }
     if (job.amendment) return job.method->solve(job.cell, job.effort, *job.amendment, done);
     if (job.effort.strategy == Strategy::kGuaranteed) return job.method->solve(job.cell);
     return job.method->solve(job.cell, job.effort, done);
@@ -45,7 +50,9 @@ ServedScene served_scene(const Scene& scene) {
 }
 
 JobDone perform(Job job) {
-  const ServedScene& scene = *job.scene;
+  JobDone done;
+  done.session = job.message.session;
+  done.sequence = job.message.sequence;
   Work work;
   const auto start = std::chrono::steady_clock::now();
   const Result<Pvs> pvs = solve(job, work);
@@ -55,27 +62,31 @@ JobDone perform(Job job) {
   wire::PvsMessage& m = job.message;
   m.solve_us = static_cast<std::uint32_t>(std::min<std::int64_t>(
       std::chrono::duration_cast<std::chrono::microseconds>(took).count(), UINT32_MAX));
-  JobDone done;
   done.failed = !pvs;
   done.cut_short = work.cut;
-  // Errs towards visible: what could not be solved is answered with every object.
-  m.everything = !pvs || !pvs->everything_because.empty();
-  if (m.everything) {
-    m.base = 0;
-  } else {
-    wire::RankSet set(scene.objects());
-    for (const ObjectId id : pvs->objects)
-      set.set(scene.rank_of[id]);
-    auto after = std::make_shared<wire::PvsState>(scene.objects());
-    m.payload =
-        wire::encode_pvs(set, job.base ? *job.base : wire::PvsState(scene.objects()), *after);
-    done.after = std::move(after);
-    done.full = m.base == 0;
+  try {
+    // Errs towards visible: what could not be solved is answered with every object.
+    m.everything = !pvs || !pvs->everything_because.empty();
+    if (m.everything) {
+      m.base = 0;
+    } else {
+      const ServedScene& scene = *job.scene;
+      wire::RankSet set(scene.objects());
+      for (const ObjectId id : pvs->objects)
+        set.set(scene.rank_of[id]);
+      auto after = std::make_shared<wire::PvsState>(scene.objects());
+      m.payload =
+          wire::encode_pvs(set, job.base ? *job.base : wire::PvsState(scene.objects()), *after);
+      done.after = std::move(after);
+      done.full = m.base == 0;
+    }
+    done.bytes = wire::encode(m);
+  } catch (const std::exception&) {
+    done.bytes.clear();
+    done.after.reset();
+    done.failed = true;
   }
   done.peer = std::move(job.peer);
-  done.session = m.session;
-  done.sequence = m.sequence;
-  done.bytes = wire::encode(m);
   return done;
 }
 

@@ -38,6 +38,7 @@ struct Job {
   Effort effort;
   std::shared_ptr<const Amendment> amendment;  ///< null: the scene is as in the file
   std::chrono::milliseconds least_solve{0};
+  bool everything = false;  ///< nothing is solved, every object is listed
   /// The PVS to code against; null: none.
   std::shared_ptr<const wire::PvsState> base;
   /// All of the answer but what perform() finds.
@@ -56,7 +57,8 @@ struct JobDone {
   bool cut_short = false;
 };
 
-/// Never throws: what cannot be solved is answered with every object. Threads: reentrant.
+/// Never throws: what cannot be solved is answered with every object, and what there is no memory
+/// for not at all (no bytes). Threads: reentrant.
 /// Cost: one solve and one encoding.
 JobDone perform(Job job);
 

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/assert.h"
 #include "core/pace.h"
 #include "core/reach.h"
 #include "core/result.h"
@@ -44,6 +45,7 @@ class Ladder {
   const OccluderIndex* largest_index() const { return indices_.back(); }
   /// Not for the largest, and once a rung.
   void add(std::uint32_t rung, const Method& method, const OccluderIndex* index = nullptr) {
+    IVIS_ASSERT((index != nullptr) == (indices_.back() != nullptr), "all rungs take edits or none");
     indices_[rung] = index;  // before the method, which tells others that the rung is there
     methods_[rung] = &method;
   }

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "scenes/edited.h"
+#include "wire/messages.h"
 
 namespace ivis::server {
 namespace {
@@ -26,10 +27,11 @@ constexpr std::uint8_t kMostBlamed = 255;
 
 }  // namespace
 
-SceneState::SceneState(const Scene& scene)
-    : scene_(scene),
-      natures_(scene.objects.size() + scene.hidden_solids.size(), 0),
-      mender_(scene) {}
+SceneState::SceneState(const Scene& scene) : scene_(scene), mender_(scene) {
+  for (ObjectId id = 0; id < occluder_count(); ++id)
+    natures_.push_back(static_cast<std::uint8_t>((is_matter(scene, object(id)) ? kMatter : 0) |
+                                                 (holds_ground(scene, object(id)) ? kGround : 0)));
+}
 
 std::uint32_t SceneState::occluder_count() const {
   return static_cast<std::uint32_t>(scene_.objects.size() + scene_.hidden_solids.size());
@@ -40,15 +42,7 @@ const Object& SceneState::object(ObjectId id) const {
                                     : scene_.hidden_solids[id - scene_.objects.size()];
 }
 
-std::uint8_t SceneState::nature(ObjectId id) {
-  std::uint8_t& n = natures_[id];
-  if (n == 0)
-    n = static_cast<std::uint8_t>(kKnown | (is_matter(scene_, object(id)) ? kMatter : 0) |
-                                  (holds_ground(scene_, object(id)) ? kGround : 0));
-  return n;
-}
-
-std::string SceneState::why_not(const Edit& edit) {
+std::string SceneState::why_not(const Edit& edit) const {
   const bool of_occluder =
       edit.kind == EditKind::kOccluderOff || edit.kind == EditKind::kOccluderOn;
   const std::uint32_t known =
@@ -58,10 +52,10 @@ std::string SceneState::why_not(const Edit& edit) {
            ", expected an id below " + std::to_string(known);
   if (!scene_.wholes.empty())
     return "the scene is split into clusters (granularity cluster), which are not moved singly";
-  if ((nature(edit.id) & kGround) != 0)
+  if ((natures_[edit.id] & kGround) != 0)
     return describe(object(edit.id), edit.id) +
            " is ground that buildings stand on, which cannot be changed";
-  if (entry_.size() >= kMostChanged && !entry_.contains(edit.id))
+  if (entry_.size() + wire::kMaxEdits > kMostChanged && !entry_.contains(edit.id))
     return "more than " + std::to_string(kMostChanged) + " objects changed";
   return {};
 }
@@ -70,10 +64,11 @@ SceneState::Outcome SceneState::apply(std::span<const Edit> edits, Time now) {
   for (const Edit& e : edits)
     if (std::string why = why_not(e); !why.empty()) return {0, std::move(why)};
   ++epoch_;
-  const std::uint64_t before = matter_version_;
   for (const Edit& e : edits)
     apply_one(e, now);
-  mending_due_ = mending_due_ || matter_version_ != before;
+  // What an object comes to in the end: a door that is switched to and fro costs as much as once.
+  for (auto e = changed_.rbegin(); e != changed_.rend() && e->epoch == epoch_; ++e)
+    update_displaced(e->state.id);
   return {epoch_, {}};
 }
 
@@ -92,14 +87,16 @@ void SceneState::apply_one(const Edit& edit, Time now) {
   }
   Entry& entry = *found->second;
   ObjectState& s = entry.state;
-  const bool was_gone = s.removed || s.moved || s.speed_m_s > 0;
-  const bool moved_itself = s.speed_m_s > 0;
+  const bool was_gone = s.removed || s.moved;
+  const bool moved_itself = s.speed_m_s > 0 && !s.removed;
+  const float speed_before = s.speed_m_s;
   entry.epoch = epoch_;
   switch (edit.kind) {
     case EditKind::kMove:
       s.placement = edit.placement;
       s.speed_m_s = edit.speed_m_s;
-      s.moved = !same_place(o, edit.placement);
+      s.moved = !same_place(o, edit.placement) || edit.speed_m_s > 0;
+      entry.slowing_m = kMoverLagS * std::max(speed_before, edit.speed_m_s);
       entry.since = now;
       entry.bounds = as_placed(o, edit.placement).bounds;
       break;
@@ -116,17 +113,19 @@ void SceneState::apply_one(const Edit& edit, Time now) {
       s.occluder_off = false;
       break;
   }
-  movers_ += (s.speed_m_s > 0 ? 1 : 0);
-  movers_ -= (moved_itself ? 1 : 0);
-  if (was_gone != (s.removed || s.moved || s.speed_m_s > 0)) gone_.reset();
-  if ((nature(edit.id) & kMatter) == 0) return;
-  // What moves by itself hides nothing.
-  const bool displaced = s.removed || s.moved || s.occluder_off || s.speed_m_s > 0;
-  if (displaced || displaced_.contains(edit.id)) ++matter_version_;
-  set_displaced(edit.id, displaced);
+  movers_ += s.speed_m_s > 0 && !s.removed ? 1 : 0;
+  movers_ -= moved_itself ? 1 : 0;
+  if (was_gone != (s.removed || s.moved)) gone_.reset();
 }
 
-void SceneState::set_displaced(ObjectId id, bool displaced) {
+/// What moves by itself hides nothing.
+void SceneState::update_displaced(ObjectId id) {
+  if ((natures_[id] & kMatter) == 0) return;
+  const ObjectState& s = entry_.at(id)->state;
+  const bool displaced = s.removed || s.moved || s.occluder_off;
+  if (!displaced && !displaced_.contains(id)) return;
+  ++matter_version_;  // also where it only moved on: what was shrunk of it is of the past
+  mending_due_ = true;
   if (displaced == displaced_.contains(id)) return;
   if (displaced)
     displaced_.emplace(id, object(id).bounds);
@@ -177,12 +176,20 @@ void SceneState::order_mending() {
   mender_.order(std::move(order));
 }
 
-std::vector<ObjectState> SceneState::since(std::uint32_t epoch) const {
-  if (epoch > epoch_) epoch = 0;
-  std::vector<ObjectState> out;
-  for (auto e = changed_.rbegin(); e != changed_.rend() && e->epoch > epoch; ++e)
-    if (e->state.id < scene_.objects.size()) out.push_back(e->state);
-  return out;
+SceneState::Told SceneState::since(std::uint32_t epoch) const {
+  Told told;
+  told.since = epoch > epoch_ ? 0 : epoch;
+  auto from = changed_.end();
+  while (from != changed_.begin() && std::prev(from)->epoch > told.since)
+    --from;
+  told.epoch = told.since;
+  for (; from != changed_.end(); ++from) {
+    if (told.objects.size() >= kMostTold && from->epoch != told.epoch) return told;
+    told.epoch = from->epoch;
+    if (from->state.id < scene_.objects.size()) told.objects.push_back(from->state);
+  }
+  told.epoch = epoch_;
+  return told;
 }
 
 std::shared_ptr<const Amendment> SceneState::amendment(const OccluderIndex& index, Time now,
@@ -190,24 +197,26 @@ std::shared_ptr<const Amendment> SceneState::amendment(const OccluderIndex& inde
   if (epoch_ == 0) return nullptr;
   Rung& rung = rung_of(index);
   if (std::exchange(mending_due_, false)) order_mending();
-  if (auto mended = mender_.take(); mended && mended->version == matter_version_)
+  if (auto mended = mender_.take(); mended && mended->version == matter_version_) {
     mended_ = std::move(*mended);
+    ++mendings_;
+  }
   if (!gone_) {
     auto bits = std::make_shared<std::vector<std::uint64_t>>((scene_.objects.size() + 63) / 64);
     for (const Entry& e : changed_) {
       const ObjectId id = e.state.id;
       if (id >= scene_.objects.size()) continue;
       // A mover of the scene file's own (skinned, animated) is listed wherever it is put.
-      const bool gone = e.state.removed || ((e.state.moved || e.state.speed_m_s > 0) &&
-                                            !scene_.objects[id].always_visible);
+      const bool gone = e.state.removed || (e.state.moved && !scene_.objects[id].always_visible);
       if (gone) (*bits)[id / 64] |= std::uint64_t{1} << (id % 64);
     }
     gone_ = std::move(bits);
   }
-  const std::uint64_t version = 2 * matter_version_ + (mended_.version == matter_version_ ? 1 : 0);
-  if (!displaced_.empty() && (!rung.current || rung.version != version)) {
+  if (!displaced_.empty() &&
+      (!rung.current || rung.version != matter_version_ || rung.mendings != mendings_)) {
     rung.current = change_of(index, rung);
-    rung.version = version;
+    rung.version = matter_version_;
+    rung.mendings = mendings_;
   }
   auto out = std::make_shared<Amendment>();
   out->gone = gone_;
@@ -215,14 +224,20 @@ std::shared_ptr<const Amendment> SceneState::amendment(const OccluderIndex& inde
   const auto seconds = [](Time::duration d) { return std::chrono::duration<double>(d).count(); };
   for (const Entry& e : changed_) {
     const ObjectState& s = e.state;
-    if (s.removed || !(s.moved || s.speed_m_s > 0) || scene_.objects[s.id].always_visible) continue;
+    if (s.removed || !s.moved || scene_.objects[s.id].always_visible) continue;
     // Wherever it is drawn while the PVS is in use, as the edit that told of it promised.
-    Aabb box = e.bounds;
-    if (s.speed_m_s > 0) {
-      box = grown(box, s.speed_m_s * (seconds(std::max(until, now) - e.since) + kMoverLagS));
-      // Nothing sinks below all there is.
-      box.lo.y = std::max(box.lo.y, std::min(e.bounds.lo.y, index.occluders().floor));
-    }
+    const bool just_told = seconds(now - e.since) < kMoverLagS;
+    const double away =
+        (s.speed_m_s > 0 ? s.speed_m_s * seconds(std::max(until, now) - e.since) : 0) +
+        std::max(kMoverLagS * s.speed_m_s, just_told ? e.slowing_m : 0);
+    Aabb box = grown(e.bounds, away);
+    // All of the file lies above the floor, so does what was neither lowered nor tilted, to the
+    // last bit (as_placed); and nothing that moves sinks below it.
+    const Object& o = scene_.objects[s.id];
+    const bool above = s.placement.position.y >= o.to_world[3].y && s.placement.rotation.x == 0 &&
+                       s.placement.rotation.z == 0;
+    const double floor = index.occluders().floor;
+    if (above || e.bounds.lo.y >= floor) box.lo.y = std::max(box.lo.y, floor);
     out->placed.push_back({s.id, box});
   }
   return out;
@@ -232,8 +247,10 @@ std::shared_ptr<const OccluderChange> SceneState::change_of(const OccluderIndex&
                                                             Rung& rung) const {
   auto change = std::make_shared<OccluderChange>();
   change->shrunk_off = rung.blamed;
+  std::vector<Aabb> boxes;
   for (const auto& [id, box] : displaced_)
-    change->displaced.push_back(box);
+    boxes.push_back(box);
+  change->displaced = DisplacedMatter(std::move(boxes));
   if (mended_.version == matter_version_)
     if (const auto found = mended_.rungs.find(&index); found != mended_.rungs.end()) {
       change->added = found->second.added;

@@ -21,18 +21,22 @@ namespace ivis::server {
 
 /// The scene as edits have left it: what each object is now, and what that means for the occluders
 /// of each rung. An edit costs what it touches: the tree of objects and the maps' walls stay as
-/// they are, answers are computed with an Amendment. Guarantee: whatever may rest on matter that is
-/// not where the scene file has it hides nothing. A
-///            mover is listed wherever it may be seen within its speed from where it was last told,
-///            kMoverLag before included, so that clients may draw it a little late.
-/// Threads:   one at a time; mending goes on in a thread of its own. Ownership: borrows the scene
-///            and the occluders, by the indices given.
+/// they are, answers are computed with an Amendment.
+///
+/// Guarantee: whatever may rest on matter that is not where the scene file has it hides nothing.
+///            A mover is listed wherever it may be seen within its speed from where it was last
+///            told, kMoverLagS more included, so that clients may draw it a little late. (It does
+///            not sink below the scene's lowest point, unless it was told there.)
+/// Threads:   one at a time; mending goes on in a thread of its own.
+/// Ownership: borrows the scene, and the occluders by the indices given.
 class SceneState {
  public:
   using Time = std::chrono::steady_clock::time_point;
   static constexpr double kMoverLagS = 0.1;
   /// That a message can tell of.
-  static constexpr std::size_t kMostChanged = 1'000'000;
+  static constexpr std::size_t kMostChanged = 100'000;
+  /// Of one answer, but for the rest of an epoch: 64 bytes each.
+  static constexpr std::size_t kMostTold = 4096;
 
   explicit SceneState(const Scene& scene);
 
@@ -44,8 +48,14 @@ class SceneState {
   Outcome apply(std::span<const Edit> edits, Time now);
 
   std::uint32_t epoch() const { return epoch_; }
-  /// What has changed since that epoch, as it is now; later epochs than epoch() count as 0.
-  std::vector<ObjectState> since(std::uint32_t epoch) const;
+  struct Told {
+    std::uint32_t epoch = 0;           ///< that a client comes to by it: epoch(), if that is all
+    std::uint32_t since = 0;           ///< told against: as asked, or 0
+    std::vector<ObjectState> objects;  ///< as they are now
+  };
+  /// What has changed since that epoch. Where that is very much it is a part: of the earliest
+  /// epochs. Later epochs than epoch() count as 0.
+  Told since(std::uint32_t epoch) const;
   /// Is there anything that moves by itself?
   bool moves() const { return movers_ > 0; }
   /// For a PVS that is in use from `now` to `until`, by the occluders behind `index`; null: the
@@ -60,6 +70,7 @@ class SceneState {
     ObjectState state;
     std::uint32_t epoch = 0;  ///< of its last change
     Time since{};             ///< when its placement was told
+    double slowing_m = 0;     ///< by how far it may be drawn late, as it was faster before
     Aabb bounds;              ///< as placed
   };
   /// What the edits mean to one rung.
@@ -67,17 +78,17 @@ class SceneState {
     std::map<ObjectId, std::vector<std::uint32_t>> touched;  ///< prisms, by what is displaced
     std::vector<std::uint8_t> blamed;                        ///< how many displaced touch a prism
     std::shared_ptr<const OccluderChange> current;
-    std::uint64_t version = 0;
+    std::uint64_t version = 0;  ///< matter_version_ and mendings_ that `current` is of
+    std::uint64_t mendings = 0;
   };
 
   std::uint32_t occluder_count() const;
   const Object& object(ObjectId id) const;
-  /// What the object is to occluders; worked out once.
-  enum Nature : std::uint8_t { kKnown = 1, kMatter = 2, kGround = 4 };
-  std::uint8_t nature(ObjectId id);
-  std::string why_not(const Edit& edit);
+  /// What an object is to occluders.
+  enum Nature : std::uint8_t { kMatter = 1, kGround = 2 };
+  std::string why_not(const Edit& edit) const;
   void apply_one(const Edit& edit, Time now);
-  void set_displaced(ObjectId id, bool displaced);
+  void update_displaced(ObjectId id);
   void displace(const OccluderIndex& index, Rung& rung, ObjectId id) const;
   static void replace(Rung& rung, ObjectId id);
   std::shared_ptr<const OccluderChange> change_of(const OccluderIndex& index, Rung& rung) const;
@@ -85,7 +96,7 @@ class SceneState {
   void order_mending();
 
   const Scene& scene_;
-  std::vector<std::uint8_t> natures_;
+  std::vector<std::uint8_t> natures_;  ///< of objects, then of nodes that only occlude
   std::uint32_t epoch_ = 0;
   std::list<Entry> changed_;  ///< ascending epochs
   std::unordered_map<ObjectId, std::list<Entry>::iterator> entry_;
@@ -95,7 +106,8 @@ class SceneState {
   bool mending_due_ = false;  ///< ordered with the next answer: who does not ask needs none
   std::size_t movers_ = 0;
   std::map<const OccluderIndex*, Rung> rungs_;
-  Mender::Mended mended_;  ///< counts while it is of matter_version_
+  Mender::Mended mended_;       ///< counts while it is of matter_version_
+  std::uint64_t mendings_ = 0;  ///< taken into use
   Mender mender_;
 };
 

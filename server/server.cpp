@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <new>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include <unistd.h>
@@ -18,8 +20,9 @@ namespace {
 constexpr std::int64_t kMaxIncomingBytes = 64 << 10;
 // Messages are taken in at once; answers of a client that does not read are dropped beyond it.
 constexpr int kReceiveQueue = 256;
-constexpr int kSendQueue = 16;
+constexpr int kSendQueue = 8;
 constexpr int kMaxDrained = 4096;
+constexpr std::uint64_t kMaxEditsDrained = 2048;  // some milliseconds
 constexpr auto kLookAtStop = std::chrono::milliseconds(100);
 constexpr auto kHousekeeping = std::chrono::seconds(1);
 
@@ -74,7 +77,9 @@ struct Server::Impl {
   void drain() {
     zmq::message_t peer;
     zmq::message_t body;
+    const auto edits = sessions.counters().edits;
     for (int i = 0; i < kMaxDrained; ++i) {
+      if (sessions.counters().edits - edits >= kMaxEditsDrained) return;
       if (!socket.recv(peer, zmq::recv_flags::dontwait)) return;
       bool more = peer.more();
       bool one_body =
@@ -187,6 +192,8 @@ Result<std::unique_ptr<Server>> Server::bind(const ServerOptions& options, const
     return std::unique_ptr<Server>(new Server(std::move(impl)));
   } catch (const zmq::error_t& e) {
     return explain(e, options.listen);
+  } catch (const std::system_error& e) {
+    return connection_error("no threads to solve with: " + std::string(e.what()));
   }
 }
 
@@ -216,6 +223,8 @@ void Server::run(const std::atomic<bool>& stop,
       if (e.num() == EINTR) continue;  // a signal: look at `stop`
       s.log.error("socket_failed", {{"reason", e.what()}});
       break;
+    } catch (const std::bad_alloc&) {  // costs what was at hand, not the daemon
+      s.log.error("out_of_memory", {{"clients", s.sessions.size()}});
     }
   }
   try {

@@ -21,6 +21,7 @@ constexpr auto kShortestValid = std::chrono::milliseconds(100);
 constexpr auto kLongestValid = std::chrono::milliseconds(1000);
 /// Answers that SessionTable::passed_over_ looks back on.
 constexpr double kLookBack = 256;
+constexpr std::uint32_t kMostPassedOver = 8;
 
 SessionTable::Time::duration frame_of(const Pace& pace) {
   return std::chrono::duration_cast<SessionTable::Time::duration>(
@@ -117,6 +118,7 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
   session.due = now;
   session.welcome_due = true;
   session.table_wanted = hello.want_table;
+  noticed_epoch_ = 0;  // nor has it been told
   forget(peer);
   enqueue(*sessions_.emplace(peer, std::move(session)).first);
   return std::nullopt;
@@ -262,6 +264,10 @@ std::optional<Outgoing> SessionTable::finish(JobDone done) {
   if (done.cut_short) ++counters_.cut_short;
   if (done.full) ++counters_.full_sets;
   counters_.bytes_out += done.bytes.size();
+  if (done.bytes.empty()) {  // no memory for it: the client will ask again
+    if (session.pose) enqueue(*found);
+    return std::nullopt;
+  }
   if (done.after) remember(session, done.sequence, std::move(done.after));
   if (session.pose) enqueue(*found);
   return Outgoing{std::move(done.peer), std::move(done.bytes)};
@@ -311,7 +317,8 @@ Job SessionTable::answer(Peers::value_type& peer, Time now) {
   // The first frame that needs another PVS.
   session.due = session.posed + frame_of(session.pace) +
                 std::max<Time::duration>(kLeastHold, std::chrono::microseconds(pose.hold_us));
-  passed_over_ += (session.passed_over - passed_over_) / kLookBack;
+  // Of a client that says where it is more often than it draws, no more than of others.
+  passed_over_ += (std::min(session.passed_over, kMostPassedOver) - passed_over_) / kLookBack;
   session.passed_over = 0;
 
   const Ladder::Choice choice = choose(session, pose.hold_us);
@@ -348,14 +355,18 @@ Job SessionTable::answer(Peers::value_type& peer, Time now) {
 void SessionTable::add_changes(const Ladder::Choice& choice, const wire::PoseMessage& pose,
                                Time now, Job& job) const {
   wire::SceneChanges& changes = job.message.changes;
-  changes.epoch = state_->epoch();
-  changes.since = pose.epoch <= changes.epoch ? pose.epoch : 0;
-  changes.objects = state_->since(changes.since);
+  SceneState::Told told = state_->since(pose.epoch);
+  changes.epoch = told.epoch;
+  changes.since = told.since;
+  changes.objects = std::move(told.objects);
+  // A client that is behind by very much is brought on in steps, and sees everything meanwhile.
+  job.everything = told.epoch != state_->epoch();
   Time until = now;
   if (state_->moves()) {
-    const auto valid = std::clamp<std::chrono::microseconds>(
-        std::chrono::microseconds(std::uint64_t{kHolds} * pose.hold_us), kShortestValid,
-        kLongestValid);
+    const auto wanted = pose.hold_us == 0
+                            ? std::chrono::microseconds(kLongestValid)
+                            : std::chrono::microseconds(std::uint64_t{kHolds} * pose.hold_us);
+    const auto valid = std::clamp<std::chrono::microseconds>(wanted, kShortestValid, kLongestValid);
     changes.valid_us = static_cast<std::uint32_t>(valid.count());
     until += valid;
   }

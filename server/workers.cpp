@@ -12,11 +12,20 @@ namespace ivis::server {
 
 Workers::Workers(unsigned threads) : fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
   if (fd_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
-  for (unsigned i = 0; i < threads; ++i)
-    threads_.emplace_back([this] { run(); });
+  try {
+    for (unsigned i = 0; i < threads; ++i)
+      threads_.emplace_back([this] { run(); });
+  } catch (...) {
+    end();
+    throw;
+  }
 }
 
 Workers::~Workers() {
+  end();
+}
+
+void Workers::end() {
   {
     const std::lock_guard lock(mutex_);
     stop_ = true;

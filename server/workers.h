@@ -31,6 +31,7 @@ class Workers {
 
  private:
   void run();
+  void end();
 
   int fd_;
   std::mutex mutex_;

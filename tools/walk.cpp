@@ -69,7 +69,6 @@ Outcome run_walk(const WalkArgs& args) {
     print({{"poses", r->poses},
            {"stalls", r->stalls},
            {"uncovered_frames", r->uncovered_frames},
-           {"epoch", r->epoch},
            {"bytes_mean", r->bytes_mean},
            {"bytes_median", r->bytes_median},
            {"round_trip_ms_p50", r->round_trip_ms_p50},
@@ -92,6 +91,7 @@ Outcome run_walk(const WalkArgs& args) {
            {"latency_ms", r->latency_ms},
            {"interval_ms", r->interval_ms},
            {"hold_ms", r->hold_ms},
+           {"epoch", r->epoch},
            {"frames", r->frames}});
     return kOk;
   }

@@ -74,7 +74,7 @@ class BackingCull final : public CulledMethod {
   /// It is where it was, and so is what backs it.
   static bool still_backed(const Amendment& amendment, ObjectId id, const Backed& object) {
     return !amendment.is_gone(id) &&
-           (!amendment.occluders || !near_displaced(*amendment.occluders, object.box));
+           (!amendment.occluders || !amendment.occluders->displaced.near(object.box));
   }
   static double behind(const Backing& b, const Vec3& eye, const Reach& reach) {
     return b.plane.offset - glm::dot(b.plane.normal, eye) - reach.support(b.plane.normal);

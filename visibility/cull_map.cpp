@@ -519,14 +519,22 @@ void CullMap::find(const BoxTree& tree, const Eye& eye, std::uint64_t most, Scra
   }
 }
 
+bool CullMap::within_extent(const Aabb& box) const {
+  const Vec3 far = glm::max(glm::abs(box.lo - origin_), glm::abs(box.hi - origin_));
+  return std::max({far.x, far.y, far.z}) <= extent_m_;
+}
+
 /// Few changes of occluders come in a while in which many solves do: the last one is kept.
 std::shared_ptr<const WallSet> CullMap::added_walls(const Amendment* amendment) const {
   if (amendment == nullptr || !amendment->occluders || amendment->occluders->added.empty())
     return nullptr;
   const std::lock_guard lock(added_mutex_);
   if (added_of_.lock() != amendment->occluders) {
-    added_ = std::make_shared<const WallSet>(
-        make_walls(amendment->occluders->added, occluders_.floor, origin_));
+    // Beyond the extent single precision errs by more than the slack pays for.
+    std::vector<Prism> prisms;
+    for (const Prism& p : amendment->occluders->added)
+      if (within_extent(p.bounds())) prisms.push_back(p);
+    added_ = std::make_shared<const WallSet>(make_walls(prisms, occluders_.floor, origin_));
     added_of_ = amendment->occluders;
   }
   return added_;
@@ -540,8 +548,7 @@ void CullMap::find_placed(const Eye& eye, const Amendment& amendment, Scratch& s
   std::vector<Aabb> boxes;
   std::vector<std::uint32_t> ids;
   for (const Amendment::Placed& p : amendment.placed) {
-    const Vec3 far = glm::max(glm::abs(p.bounds.lo - origin_), glm::abs(p.bounds.hi - origin_));
-    if (!(std::max({far.x, far.y, far.z}) <= extent_m_) || !(p.bounds.lo.y >= occluders_.floor)) {
+    if (!within_extent(p.bounds) || !(p.bounds.lo.y >= occluders_.floor)) {
       scratch.visible.push_back(p.object);
       continue;
     }

@@ -74,6 +74,7 @@ class CullMap : public Method {
 
   Result<Pvs> solve(const ViewCell& cell, LastShown* last, const Effort& effort,
                     const Amendment* amendment, Stats& stats) const;
+  bool within_extent(const Aabb& box) const;
   void find_placed(const Eye& eye, const Amendment& amendment, Scratch& scratch,
                    Stats& stats) const;
   std::shared_ptr<const WallSet> added_walls(const Amendment* amendment) const;

@@ -51,7 +51,9 @@ enum : std::uint8_t { kRemoved = 1, kOccluderOff = 2, kMoved = 4, kAllFlags = 7 
 fb::Change to_fb(const ObjectState& s) {
   const int flags =
       (s.removed ? kRemoved : 0) | (s.occluder_off ? kOccluderOff : 0) | (s.moved ? kMoved : 0);
-  return to_fb(static_cast<std::uint8_t>(flags), s.id, s.placement, s.speed_m_s);
+  // Where the scene file has an object may be anywhere; where an edit put one is checked.
+  return to_fb(static_cast<std::uint8_t>(flags), s.id, s.moved ? s.placement : Placement{},
+               s.speed_m_s);
 }
 
 Status check(const fb::Change& c) {
@@ -59,7 +61,7 @@ Status check(const fb::Change& c) {
                     {c.rotation_w(), c.rotation_x(), c.rotation_y(), c.rotation_z()}};
   if (!p.valid())
     return input_error("object " + std::to_string(c.id()) +
-                       ": a position not finite or beyond 1e6 m, or a rotation that is none");
+                       ": a position not finite or beyond 1e9 m, or a rotation that is none");
   if (!(c.speed() >= 0 && c.speed() <= kFastestMoverMs))
     return input_error("object " + std::to_string(c.id()) + ": a speed not from 0 to 1000 m/s");
   return ok();

@@ -281,6 +281,18 @@ TEST(RealTime, WhereThingsMoveByThemselvesASetRunsOutThoughTheObserverStandsStil
   }
 }
 
+TEST(RealTime, ASetThatRunsOutOnItsWayIsCompleteForNobody) {
+  Observer run;
+  run.open({60ms, [](std::uint64_t) { return Duration{1ms}; }}, Observer::stalling());
+  run.source->valid_us = 100'000;  // of 121 ms that it takes
+  run.walk(60, 0);
+  const ivis_stats stats = run.client->stats();
+  EXPECT_EQ(stats.stalls, 0U) << "holding time now does not bring back what moved meanwhile";
+  EXPECT_EQ(stats.uncovered_frames, 60U);
+  EXPECT_GT(stats.causes[IVIS_CAUSE_EXPIRED], 40U);
+  EXPECT_EQ(run.missing, 0U);
+}
+
 TEST(RealTime, ANoticeOfAChangedSceneIsAskedAboutByLooking) {
   Observer run;
   run.open({5ms, [](std::uint64_t) { return Duration{1ms}; }}, Observer::stalling());

@@ -12,9 +12,11 @@
 #include "occluders/fast_erosion.h"
 #include "occluders/shrink.h"
 #include "scenes/edited.h"
+#include "tests/support/scene_builder.h"
 #include "tests/visibility/contract_scenes.h"
 #include "visibility/method.h"
 #include "visibility/verify.h"
+#include "wire/messages.h"
 
 namespace ivis::test {
 namespace {
@@ -69,7 +71,7 @@ class EditedScene {
   }
   std::map<ObjectId, ObjectState> states() const {
     std::map<ObjectId, ObjectState> out;
-    for (const ObjectState& s : state.since(0))
+    for (const ObjectState& s : state.since(0).objects)
       out[s.id] = s;
     return out;
   }
@@ -117,7 +119,7 @@ TEST(SceneStateTest, WithoutEditsThereIsNothingToAmend) {
   EditedScene e(random_town(3, false));
   EXPECT_EQ(e.amendment(), nullptr);
   EXPECT_EQ(e.state.epoch(), 0U);
-  EXPECT_TRUE(e.state.since(0).empty());
+  EXPECT_TRUE(e.state.since(0).objects.empty());
 }
 
 TEST(SceneStateTest, AnObjectPutBackWhereItWasChangesNothing) {
@@ -133,7 +135,7 @@ TEST(SceneStateTest, AnObjectPutBackWhereItWasChangesNothing) {
   EXPECT_EQ(e.solve(eye, back.get()).objects, e.solve(eye, nullptr).objects);
   EXPECT_FALSE(back->occluders) << "no mask is left";
   ASSERT_TRUE(moved->occluders);
-  const auto states = e.state.since(0);
+  const auto states = e.state.since(0).objects;
   ASSERT_EQ(states.size(), 2U);
   EXPECT_TRUE(states[0].as_in_the_file() && states[1].as_in_the_file());
 }
@@ -338,7 +340,7 @@ TEST(SceneStateTest, EditsAreDoneWhollyOrNotAtAll) {
   EXPECT_EQ(outcome.why, "no object " + std::to_string(objects) + ", expected an id below " +
                              std::to_string(objects));
   EXPECT_EQ(e.state.epoch(), 0U);
-  EXPECT_TRUE(e.state.since(0).empty());
+  EXPECT_TRUE(e.state.since(0).objects.empty());
   const Edit occluder{EditKind::kOccluderOff, objects, {}, 0};
   EXPECT_EQ(e.state.apply({&occluder, 1}, e.now).why, "no occluder " + std::to_string(objects) +
                                                           ", expected an id below " +
@@ -366,14 +368,111 @@ TEST(SceneStateTest, TellsOfEachObjectOnceAndOnlyWhatIsNew) {
   for (int i = 0; i < 2000; ++i)
     e.move_by(static_cast<ObjectId>(i % 10), {0.01 * i, 0, 0});
   EXPECT_EQ(e.state.epoch(), 2000U);
-  EXPECT_EQ(e.state.since(0).size(), 10U);
-  EXPECT_EQ(e.state.since(1997).size(), 3U);
-  EXPECT_EQ(e.state.since(2000).size(), 0U);
-  EXPECT_EQ(e.state.since(3000).size(), 10U) << "an epoch that never was: all of it";
-  const auto newest = e.state.since(1999);
+  EXPECT_EQ(e.state.since(0).objects.size(), 10U);
+  EXPECT_EQ(e.state.since(1997).objects.size(), 3U);
+  EXPECT_EQ(e.state.since(2000).objects.size(), 0U);
+  EXPECT_EQ(e.state.since(3000).objects.size(), 10U) << "an epoch that never was: all of it";
+  const auto newest = e.state.since(1999).objects;
   ASSERT_EQ(newest.size(), 1U);
   EXPECT_EQ(newest[0].id, 9U);
   EXPECT_DOUBLE_EQ(newest[0].placement.position.x, 19.99);
+}
+
+TEST(SceneStateTest, ALateClientIsToldInStepsOfWholeEpochs) {
+  SceneBuilder b;
+  for (int i = 0; i < 6000; ++i)
+    b.add_box({2.0 * i, 0, 0}, {2.0 * i + 1, 1, 1}, OccluderTag::kNever);
+  const Scene scene = std::move(b).finish();
+  SceneState state(scene);
+  for (ObjectId first = 0; first < 6000; first += 1000) {
+    std::vector<Edit> edits;
+    for (ObjectId id = first; id < first + 1000; ++id)
+      edits.push_back({EditKind::kRemove, id, {}, 0});
+    ASSERT_NE(state.apply(edits, {}).epoch, 0U);
+  }
+  const auto part = state.since(0);
+  EXPECT_EQ(part.epoch, 5U);
+  EXPECT_EQ(part.objects.size(), 5000U);
+  const auto rest = state.since(part.epoch);
+  EXPECT_EQ(rest.since, 5U);
+  EXPECT_EQ(rest.epoch, 6U);
+  EXPECT_EQ(rest.objects.size(), 1000U);
+}
+
+TEST(SceneStateTest, OfAFileFarFromItsOriginAnUnmovedObjectIsToldWithoutAPlace) {
+  SceneBuilder b;
+  b.add_box({5.4e9, 0, 0}, {5.4e9 + 1, 1, 1});
+  EditedScene e(std::move(b).finish());
+  e.edit(EditKind::kRemove, 0);
+  wire::PvsMessage m;
+  m.everything = true;
+  m.changes = {1, 0, 0, e.state.since(0).objects};
+  ASSERT_EQ(m.changes.objects.size(), 1U);
+  const auto decoded = wire::decode(wire::encode(m));
+  ASSERT_TRUE(decoded) << decoded.error().message;
+  EXPECT_TRUE(std::get<wire::PvsMessage>(*decoded).changes.objects[0].removed);
+}
+
+TEST(SceneStateTest, WhatStandsOnTheFloorIsHiddenWhereItIsPut) {
+  // A flat town: everything stands on the floor.
+  SceneBuilder b;
+  b.add_box({-100, 0, -100}, {-99, 1, -99});
+  b.add_box({99, 0, 99}, {100, 1, 100});
+  b.add_box({10, 0, -20}, {14, 12, 20});
+  const ObjectId thing = b.add_box({-30, 0, -1}, {-29, 1, 0}, OccluderTag::kNever);
+  EditedScene e(std::move(b).finish());
+  const Vec3 eye{0, 1.7, 0};
+  e.move_by(thing, {60, 0, 0}, 1);
+  EXPECT_FALSE(std::ranges::binary_search(e.solve(eye, e.amendment().get()).objects, thing));
+  e.move_by(thing, {60, -0.5, 0}, 1);
+  EXPECT_TRUE(std::ranges::binary_search(e.solve(eye, e.amendment().get()).objects, thing))
+      << "below all there was";
+  e.move_by(thing, {60, 0, 0}, 0, 5);
+  EXPECT_FALSE(std::ranges::binary_search(e.solve(eye, e.amendment(100ms).get()).objects, thing));
+  e.move_by(thing, {2000, 0, 0});
+  EXPECT_TRUE(std::ranges::binary_search(e.solve(eye, e.amendment().get()).objects, thing))
+      << "where single precision cannot tell";
+}
+
+TEST(SceneStateTest, AMoverThatStopsMayStillBeDrawnLate) {
+  EditedScene e(random_town(11, false));
+  e.move_by(5, {1, 0, 0}, 0, 30);
+  e.now += 1s;
+  e.move_by(5, {2, 0, 0});
+  const auto half = [&] { return e.amendment()->placed[0].bounds.size().x / 2; };
+  const double at_first = half();
+  e.now += 150ms;
+  EXPECT_NEAR(at_first - half(), 3, 1e-9) << "30 m/s for 0.1 s";
+}
+
+TEST(SceneStateTest, ARungThatIsReadyLaterIsMendedToo) {
+  ContractScene city = small_city();
+  EditedScene e(city.scene, Reach::cylinder(0.6, 0.1));
+  for (std::size_t k = 0; k < e.buildings.size(); k += 6)
+    e.edit(EditKind::kOccluderOff, e.buildings[k]);
+  e.wait_until_mended();
+  const OccluderSet later_set = e.shrunk();
+  const OccluderIndex later(later_set);
+  const auto amended = [&] { return e.state.amendment(later, e.now, e.now); };
+  EXPECT_FALSE(amended()->occluders->shrunk_off.empty()) << "masked at once";
+  for (int i = 0; i < 20'000 && amended()->occluders->added.empty(); ++i)
+    std::this_thread::sleep_for(1ms);
+  EXPECT_EQ(amended()->occluders->added.size(), e.amendment()->occluders->added.size());
+}
+
+TEST(SceneStateTest, AThingOnAWallShowsOnceTheWallIsGone) {
+  // A sign on a wall's far side, which its wall backs; a second wall far away keeps the cell busy.
+  SceneBuilder b;
+  const ObjectId wall = b.add_box({10, 0, -20}, {14, 12, 20});
+  const ObjectId sign = b.add_box({14, 2, -1}, {14.05, 3, 1}, OccluderTag::kNever);
+  EditedScene e(std::move(b).finish());
+  const auto backing = std::ranges::count(e.set.backings, sign, &Backing::object);
+  ASSERT_EQ(backing, 1);
+  const Vec3 eye{0, 1.7, 0};
+  EXPECT_FALSE(std::ranges::binary_search(e.solve(eye, nullptr).objects, sign));
+  e.edit(EditKind::kOccluderOff, wall);
+  EXPECT_TRUE(std::ranges::binary_search(e.solve(eye, e.amendment().get()).objects, sign));
+  EXPECT_EQ(e.misses(eye), 0U);
 }
 
 }  // namespace

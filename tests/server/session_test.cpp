@@ -612,11 +612,12 @@ TEST_F(Edits, WhoAsksNothingIsToldOnce) {
 TEST_F(Edits, ASceneWithMoversIsValidForATime) {
   Peer a = greet("a");
   edit(a, {{EditKind::kMove, 5, {{0, 0, 0}, {1, 0, 0, 0}}, 10}});
-  EXPECT_EQ(ask(a, 1, 0, 0).changes.valid_us, 100'000U);
-  EXPECT_EQ(ask(a, 2, 0, 50'000).changes.valid_us, 150'000U);
-  EXPECT_EQ(ask(a, 3, 0, 4'000'000'000).changes.valid_us, 1'000'000U);
+  EXPECT_EQ(ask(a, 1, 0, 0).changes.valid_us, 1'000'000U) << "it is not known for how long";
+  EXPECT_EQ(ask(a, 5, 0, 20'000).changes.valid_us, 100'000U);
+  EXPECT_EQ(ask(a, 6, 0, 50'000).changes.valid_us, 150'000U);
+  EXPECT_EQ(ask(a, 7, 0, 4'000'000'000).changes.valid_us, 1'000'000U);
   edit(a, {{EditKind::kMove, 5, {{0, 0, 0}, {1, 0, 0, 0}}, 0}});
-  EXPECT_EQ(ask(a, 4, 0, 0).changes.valid_us, 0U);
+  EXPECT_EQ(ask(a, 8, 0, 0).changes.valid_us, 0U);
 }
 
 TEST_F(Edits, OfTheSameObjectTheLastCounts) {

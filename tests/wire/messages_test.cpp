@@ -180,7 +180,7 @@ TEST(WireDecoder, RejectsNumbersThatAreNotFinite) {
 TEST(WireDecoder, RejectsPlacementsThatAreNone) {
   const double x = 1234.5;
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(),
-                           std::numeric_limits<double>::infinity(), 1.1e6, -1.1e6}) {
+                           std::numeric_limits<double>::infinity(), 1.1e9, -1.1e9}) {
     const EditMessage edit{1, 2, {{EditKind::kMove, 3, {{0, x, 0}, {1, 0, 0, 0}}, 0}}};
     EXPECT_NE(error_of(patched(encode(edit), x, bad)).find("object 3: a position"),
               std::string::npos);
