@@ -10,15 +10,20 @@
 namespace ivis {
 namespace {
 
+Box2 flat(const Aabb& box) {
+  return {{box.lo.x, box.lo.z}, {box.hi.x, box.hi.z}};
+}
+
 bool same(const Prism& a, const Prism& b) {
   return a.bottom == b.bottom && a.top == b.top && a.footprint.rings == b.footprint.rings;
 }
 
 std::vector<Prism> shrink_solids(const std::vector<Prism>& solids, const OccluderSet& set,
-                                 const Eroder& eroder) {
+                                 const Eroder& eroder, const Context& context) {
   std::vector<Prism> out;
   const Reach grown = shrink_reach(set);
-  for (const FusedStack& stack : fuse(solids, set.floor, {}, {})) {
+  for (const FusedStack& stack : fuse(solids, set.floor, {}, context)) {
+    if (context.stopped()) break;
     ShrunkStack shrunk = shrink_stack(stack, set, grown, eroder);
     std::ranges::move(shrunk.prisms, std::back_inserter(out));
   }
@@ -28,14 +33,15 @@ std::vector<Prism> shrink_solids(const std::vector<Prism>& solids, const Occlude
 }  // namespace
 
 std::vector<Prism> mend(const OccluderIndex& index, std::span<const Displaced> displaced,
-                        const Eroder& eroder) {
+                        const Eroder& eroder, const Context& context) {
   const OccluderSet& set = index.occluders();
-  std::vector<Aabb> blocks;  // of the prisms that are out of use
+  std::vector<Box2> blocks;  // of the prisms that are out of use, which all reach down
   for (const Displaced& d : displaced)
     for (const std::uint32_t i : index.touched(d.bounds))
-      blocks.push_back(index.box(i));
+      blocks.push_back(flat(index.box(i)));
+  const RectTree tree(blocks);
   const auto near_blocks = [&](const Aabb& box) {
-    return std::ranges::any_of(blocks, [&](const Aabb& b) { return b.overlaps(box); });
+    return !tree.all(flat(box), [&](std::uint32_t b) { return !blocks[b].overlaps(flat(box)); });
   };
   struct Near {
     Aabb box;
@@ -61,16 +67,16 @@ std::vector<Prism> mend(const OccluderIndex& index, std::span<const Displaced> d
   std::vector<Prism> solids;
   for (const Near& n : near)
     if (!n.missing) solids.push_back(set.solids[n.solid]);
-  return shrink_solids(solids, set, eroder);
+  return shrink_solids(solids, set, eroder, context);
 }
 
 ShrunkObject shrink_object(const Scene& scene, const Object& object, const OccluderSet& set,
-                           const Eroder& eroder) {
+                           const Eroder& eroder, const Context& context) {
   ShrunkObject out;
   const std::vector<Prism> solids = extract_prisms(scene, object).prisms;
   for (const Prism& p : solids)
     out.solids.push_back(p.bounds());
-  out.prisms = shrink_solids(solids, set, eroder);
+  out.prisms = shrink_solids(solids, set, eroder, context);
   return out;
 }
 

@@ -23,9 +23,10 @@ struct Displaced {
 /// last bit; where one is not found, all solids that meet its place are left out.
 ///
 /// Guarantee: as OccluderSet::shrunk, for the scene without the displaced objects.
-/// Errors:    none; what fails is left out. Threads: reentrant. Cost: as of shrinking the blocks.
+/// Errors:    none; what fails is left out, and all that remains when the context is stopped.
+/// Threads:   reentrant. Cost: as of shrinking the blocks.
 std::vector<Prism> mend(const OccluderIndex& index, std::span<const Displaced> displaced,
-                        const Eroder& eroder);
+                        const Eroder& eroder, const Context& context = {});
 
 struct ShrunkObject {
   std::vector<Prism> prisms;
@@ -35,6 +36,6 @@ struct ShrunkObject {
 /// One object alone, wherever it is now, by the set's reach, floor and slack. It does not rest on
 /// ground: its prisms reach down only to where it ends, or past the floor.
 ShrunkObject shrink_object(const Scene& scene, const Object& object, const OccluderSet& set,
-                           const Eroder& eroder);
+                           const Eroder& eroder, const Context& context = {});
 
 }  // namespace ivis

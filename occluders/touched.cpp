@@ -18,21 +18,25 @@ Box2 ground_box(const Aabb& box) {
 
 }  // namespace
 
-OccluderIndex::OccluderIndex(const OccluderSet& set) : set_(set) {
-  const Vec3 reach = padded(set.reach, set.slack_m).half_extents();
+OccluderIndex::OccluderIndex(const OccluderSet& set)
+    : set_(set), reach_(padded(set.reach, set.slack_m).half_extents()) {
   std::vector<Box2> flat;
   for (const Prism& p : set.shrunk) {
-    Aabb box = p.bounds();
-    for (int axis : {0, 2}) {
-      box.lo[axis] -= reach[axis] + kMoreM;
-      box.hi[axis] += reach[axis] + kMoreM;
-    }
-    box.lo.y = -std::numeric_limits<double>::infinity();
-    box.hi.y += kMoreM;  // no w of W rises
-    boxes_.push_back(box);
-    flat.push_back(ground_box(box));
+    boxes_.push_back(box_of(p));
+    flat.push_back(ground_box(boxes_.back()));
   }
   tree_ = RectTree(flat);
+}
+
+Aabb OccluderIndex::box_of(const Prism& prism) const {
+  Aabb box = prism.bounds();
+  for (int axis : {0, 2}) {
+    box.lo[axis] -= reach_[axis] + kMoreM;
+    box.hi[axis] += reach_[axis] + kMoreM;
+  }
+  box.lo.y = -std::numeric_limits<double>::infinity();
+  box.hi.y += kMoreM;  // no w of W rises
+  return box;
 }
 
 std::vector<std::uint32_t> OccluderIndex::touched(const Aabb& matter) const {

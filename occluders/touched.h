@@ -22,11 +22,14 @@ class OccluderIndex {
   const OccluderSet& occluders() const { return set_; }
   /// What a prism of OccluderSet::shrunk may rest on lies in this.
   const Aabb& box(std::uint32_t prism) const { return boxes_[prism]; }
+  /// The same of any prism shrunk as they are.
+  Aabb box_of(const Prism& prism) const;
   /// Indices into OccluderSet::shrunk, ascending; `matter` holds all of an object.
   std::vector<std::uint32_t> touched(const Aabb& matter) const;
 
  private:
   const OccluderSet& set_;
+  Vec3 reach_;
   RectTree tree_;
   std::vector<Aabb> boxes_;  ///< of P + W, down without end
 };

@@ -24,7 +24,6 @@ void Mender::order(Order order) {
   {
     const std::lock_guard lock(mutex_);
     order_ = std::move(order);
-    done_.reset();
   }
   ordered_.notify_one();
 }
@@ -44,39 +43,37 @@ void Mender::run() {
   while (true) {
     ordered_.wait(lock, [this] { return stop_ || order_; });
     if (stop_) return;
-    const Order order = std::move(*order_);
+    Order order = std::move(*order_);
     order_.reset();
     working_ = true;
     lock.unlock();
     std::optional<Mended> result;
     try {
-      result = mended(order);
+      result = mended(std::move(order));
     } catch (const std::exception&) {  // out of memory: they stay out of use
     }
     lock.lock();
     working_ = false;
-    if (!order_) done_ = std::move(result);
+    if (result && !stop_) done_ = std::move(result);
   }
 }
 
-Mender::Mended Mender::mended(const Order& order) const {
+Mender::Mended Mender::mended(Order order) const {
   Mended out;
-  out.version = order.version;
+  Context context;
+  context.stop = &stop_;
   const FastEroder eroder;
   std::vector<Displaced> displaced;
-  for (const Object* o : order.displaced)
-    displaced.push_back({o->bounds, extract_prisms(scene_, *o).prisms});
+  for (const auto& [id, object] : order.displaced)
+    displaced.push_back({object->bounds, extract_prisms(scene_, *object).prisms});
   for (const OccluderIndex* index : order.rungs) {
-    const OccluderSet& set = index->occluders();
     Mended::Rung& rung = out.rungs[index];
-    rung.added = mend(*index, displaced, eroder);
-    for (const Order::Moved& m : order.moved) {
-      const Object object = as_placed(*m.object, m.placement);
-      ShrunkObject shrunk = shrink_object(scene_, object, set, eroder);
-      rung.added.insert(rung.added.end(), shrunk.prisms.begin(), shrunk.prisms.end());
-      rung.solids.insert(rung.solids.end(), shrunk.solids.begin(), shrunk.solids.end());
-    }
+    rung.blocks = mend(*index, displaced, eroder, context);
+    for (const Moved& m : order.moved)
+      rung.objects.push_back(shrink_object(scene_, as_placed(*m.object, m.placement),
+                                           index->occluders(), eroder, context));
   }
+  out.order = std::move(order);
   return out;
 }
 

@@ -25,6 +25,11 @@ Aabb grown(const Aabb& box, double by) {
 /// More than this many are not counted down again.
 constexpr std::uint8_t kMostBlamed = 255;
 
+/// It is matter that stands where an edit put it.
+bool hides_where_it_is(const ObjectState& s) {
+  return s.moved && !s.removed && !s.occluder_off && s.speed_m_s == 0;
+}
+
 }  // namespace
 
 SceneState::SceneState(const Scene& scene) : scene_(scene), mender_(scene) {
@@ -141,14 +146,14 @@ void SceneState::update_displaced(ObjectId id) {
 
 void SceneState::displace(const OccluderIndex& index, Rung& rung, ObjectId id) const {
   rung.blamed.resize(index.occluders().shrunk.size(), 0);
-  const auto& touched = rung.touched.emplace(id, index.touched(displaced_.at(id))).first->second;
-  for (const std::uint32_t prism : touched)
+  auto [found, fresh] = rung.touched.try_emplace(id);
+  if (fresh) found->second = index.touched(object(id).bounds);
+  for (const std::uint32_t prism : found->second)
     if (rung.blamed[prism] != kMostBlamed) ++rung.blamed[prism];
 }
 
 void SceneState::replace(Rung& rung, ObjectId id) {
-  const auto touched = rung.touched.extract(id);
-  for (const std::uint32_t prism : touched.mapped())
+  for (const std::uint32_t prism : rung.touched.at(id))
     if (rung.blamed[prism] != kMostBlamed) --rung.blamed[prism];
 }
 
@@ -164,12 +169,10 @@ SceneState::Rung& SceneState::rung_of(const OccluderIndex& index) {
 
 void SceneState::order_mending() {
   Mender::Order order;
-  order.version = matter_version_;
   for (const auto& [id, box] : displaced_) {
-    order.displaced.push_back(&object(id));
-    const ObjectState& s = entry_.at(id)->state;
-    if (s.removed || s.occluder_off || !s.moved || s.speed_m_s > 0) continue;
-    order.moved.push_back({&object(id), s.placement});
+    order.displaced.emplace_back(id, &object(id));
+    if (hides_where_it_is(entry_.at(id)->state))
+      order.moved.push_back({id, &object(id), entry_.at(id)->state.placement});
   }
   for (const auto& [index, rung] : rungs_)
     order.rungs.push_back(index);
@@ -197,7 +200,7 @@ std::shared_ptr<const Amendment> SceneState::amendment(const OccluderIndex& inde
   if (epoch_ == 0) return nullptr;
   Rung& rung = rung_of(index);
   if (std::exchange(mending_due_, false)) order_mending();
-  if (auto mended = mender_.take(); mended && mended->version == matter_version_) {
+  if (auto mended = mender_.take()) {
     mended_ = std::move(*mended);
     ++mendings_;
   }
@@ -251,11 +254,31 @@ std::shared_ptr<const OccluderChange> SceneState::change_of(const OccluderIndex&
   for (const auto& [id, box] : displaced_)
     boxes.push_back(box);
   change->displaced = DisplacedMatter(std::move(boxes));
-  if (mended_.version == matter_version_)
-    if (const auto found = mended_.rungs.find(&index); found != mended_.rungs.end()) {
-      change->added = found->second.added;
-      change->added_solids = found->second.solids;
-    }
+  const auto mended = mended_.rungs.find(&index);
+  if (mended == mended_.rungs.end()) return change;
+  // Some edits may have come since: what rests on matter that is missing by now is left out, and so
+  // is an object that has gone on. What came back only adds.
+  std::vector<Aabb> missing;
+  for (const auto& [id, box] : displaced_)
+    if (!std::ranges::binary_search(mended_.order.displaced, id, {},
+                                    [](const auto& d) { return d.first; }))
+      missing.push_back(box);
+  for (const Prism& p : mended->second.blocks) {
+    const Aabb rests_on = index.box_of(p);
+    if (std::ranges::none_of(missing, [&](const Aabb& b) { return b.overlaps(rests_on); }))
+      change->added.push_back(p);
+  }
+  for (std::size_t k = 0; k < mended_.order.moved.size(); ++k) {
+    const Mender::Moved& moved = mended_.order.moved[k];
+    const auto now = entry_.find(moved.id);
+    if (now == entry_.end() || !hides_where_it_is(now->second->state) ||
+        !(now->second->state.placement == moved.placement))
+      continue;
+    const ShrunkObject& shrunk = mended->second.objects[k];
+    change->added.insert(change->added.end(), shrunk.prisms.begin(), shrunk.prisms.end());
+    change->added_solids.insert(change->added_solids.end(), shrunk.solids.begin(),
+                                shrunk.solids.end());
+  }
   return change;
 }
 

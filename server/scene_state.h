@@ -75,8 +75,9 @@ class SceneState {
   };
   /// What the edits mean to one rung.
   struct Rung {
-    std::map<ObjectId, std::vector<std::uint32_t>> touched;  ///< prisms, by what is displaced
-    std::vector<std::uint8_t> blamed;                        ///< how many displaced touch a prism
+    /// Prisms, by what is displaced, or was.
+    std::unordered_map<ObjectId, std::vector<std::uint32_t>> touched;
+    std::vector<std::uint8_t> blamed;  ///< how many displaced touch a prism
     std::shared_ptr<const OccluderChange> current;
     std::uint64_t version = 0;  ///< matter_version_ and mendings_ that `current` is of
     std::uint64_t mendings = 0;
@@ -106,7 +107,7 @@ class SceneState {
   bool mending_due_ = false;  ///< ordered with the next answer: who does not ask needs none
   std::size_t movers_ = 0;
   std::map<const OccluderIndex*, Rung> rungs_;
-  Mender::Mended mended_;       ///< counts while it is of matter_version_
+  Mender::Mended mended_;       ///< the newest
   std::uint64_t mendings_ = 0;  ///< taken into use
   Mender mender_;
 };

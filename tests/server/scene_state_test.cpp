@@ -271,6 +271,13 @@ TEST(SceneStateTest, AMovedBuildingHidesWhereItIsNow) {
   e.wait_until_mended();
   EXPECT_LT(size_of(e.solve(eye, e.amendment().get())), size_of(e.solve(eye, &unmended)));
   EXPECT_EQ(e.misses(eye), 0U);
+  // Edits elsewhere leave it in use, however often they come.
+  const auto added = e.amendment()->occluders->added.size();
+  const ObjectId other = e.buildings[0] != id ? e.buildings[0] : e.buildings[1];
+  e.edit(EditKind::kOccluderOff, other);
+  EXPECT_EQ(e.amendment()->occluders->added.size(), added);
+  EXPECT_EQ(e.misses(eye), 0U);
+  e.edit(EditKind::kOccluderOn, other);
   const Vec3 inside{to.x, 1.7, to.z};
   EXPECT_FALSE(e.solve(inside, e.amendment().get()).everything_because.empty())
       << "the eye is in the building";

@@ -58,7 +58,8 @@ typedef enum ivis_status {
 typedef struct ivis_pace {
   double horizontal_m_s; /* in the ground plane; 0 to 1e6 */
   double vertical_m_s;
-  double frame_s; /* between frames; 0: not told. Told to the server, decides nothing yet */
+  double frame_s; /* between frames; 0: not told. A server with too much to do goes by it: while a
+                     PVS holds longer it may wait for your next, fresher pose */
 } ivis_pace;
 
 /* What a client does when the eye is outside the cell of the PVS it has. */
@@ -179,9 +180,12 @@ typedef struct ivis_edit {
   uint32_t id;        /* of an object; of occluders also object_count + k, the k-th node of the file
                          that only occludes */
   double position[3]; /* MOVE: where the origin of the object's node comes to, world metres */
-  float rotation[4];  /* x, y, z, w, unit: its turn from how the scene file has it */
+  float rotation[4];  /* x, y, z, w, unit, normalised in double precision by whoever uses it: its
+                         turn about that origin from how the scene file has it */
   float speed_m_s;    /* above 0: it goes on by itself, at most so fast: wherever it is drawn at a
-                         time t after this edit is within speed * (t + 0.1 s) of `position` */
+                         time t after the server took this edit is within speed * (t + 0.1 s) of
+                         `position`, turned as told, and not below the lowest point of the scene
+                         file unless `position` is */
 } ivis_edit;
 
 /* Asks the server to change the scene for all its clients: all `count` (1 to 1024) edits in their
