@@ -137,9 +137,9 @@ void ivis_client::take() {
     stats_.last_round_trip_ms = milliseconds(options_.now() - s->at);
 }
 
-/// Nothing that is known of the one before says anything of another. (An answer that came together
-/// with the Welcome goes too: the next pose brings one.)
+/// Nothing that is known of the one before says anything of another.
 void ivis_client::leave_scene() {
+  ask_again_ = sequence_ != 0;
   answer_ = {};
   states_.clear();
   untold_.clear();
@@ -276,7 +276,8 @@ ivis_status ivis_client::view(const Vec3& eye, ivis_frame& out) {
   take();
   const Time now = options_.now();
   changes_.clear();
-  if (finite(eye) && wants_another(now)) static_cast<void>(pose(eye));
+  if (finite(eye) && (wants_another(now) || std::exchange(ask_again_, false)))
+    static_cast<void>(pose(eye));
   for (const auto& [id, state] : untold_)
     changes_.push_back(told(state));
   untold_.clear();

@@ -77,6 +77,7 @@ struct ivis_client {
   Time met_{};  ///< when the present session was first noticed
   ivis::client::Answer answer_;
   std::uint64_t session_ = 0;  ///< SourceStats::reconnects when answer_ came
+  bool ask_again_ = false;     ///< the next view poses, as what was answered is of another scene
   bool too_late_ = false;      ///< answer_ had expired when it was first looked at
   std::uint64_t scenes_ = 0;   ///< SourceStats::scenes when last looked at
   std::map<ivis::ObjectId, ivis::ObjectState> states_;  ///< of objects not as in the file

@@ -336,7 +336,8 @@ Job SessionTable::answer(Peers::value_type& peer, Time now) {
   job.message.safe = static_cast<std::uint16_t>(choice.safe * wire::PvsMessage::kAllSafe);
   if (state_ != nullptr && state_->epoch() != 0) {
     add_changes(choice, pose, now, job);
-    session.told_epoch = state_->epoch();
+    session.told_epoch = job.message.changes.epoch;
+    if (session.told_epoch != state_->epoch()) noticed_epoch_ = 0;  // it is to ask for the rest
   }
   const auto base = std::find_if(session.sent.begin(), session.sent.end(),
                                  [&](const Remembered& r) { return r.sequence == pose.have_pvs; });

@@ -482,6 +482,14 @@ TEST_F(ClientOverTcp, AnotherSceneIsFollowedByThoseThatSaidSo) {
     EXPECT_EQ(c->view(eye).raw().scene_hash, scene.hash);
   }
   server.replace();
+  for (int i = 0; i < kWait && following.view(eye).raw().scene_hash == scene.hash; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  bool covered = false;
+  for (int i = 0; i < kWait && !covered; ++i) {
+    covered = following.view(eye).covered();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_TRUE(covered) << "by looking alone";
   ASSERT_TRUE(goes_on(following, eye)) << following.error();
   const PvsView view = following.view(eye);
   EXPECT_EQ(view.raw().scene_hash, other.hash);

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/server/fake_method.h"
+#include "tests/support/scene_builder.h"
 #include "wire/object_table.h"
 
 namespace ivis::test {
@@ -618,6 +619,49 @@ TEST_F(Edits, ASceneWithMoversIsValidForATime) {
   EXPECT_EQ(ask(a, 7, 0, 4'000'000'000).changes.valid_us, 1'000'000U);
   edit(a, {{EditKind::kMove, 5, {{0, 0, 0}, {1, 0, 0, 0}}, 0}});
   EXPECT_EQ(ask(a, 8, 0, 0).changes.valid_us, 0U);
+}
+
+TEST(EditsOfMuch, ComeInStepsInWhichEverythingIsListed) {
+  SceneBuilder b;
+  for (int i = 0; i < 6000; ++i)
+    b.add_box({2.0 * i, 0, 0}, {2.0 * i + 1, 1, 1}, OccluderTag::kNever);
+  const Scene scene = std::move(b).finish();
+  const NearMethod method(scene);
+  const server::ServedScene served = server::served_scene(scene);
+  const OccluderSet set;
+  const OccluderIndex index(set);
+  const server::Ladder ladder(Reach::disc(2), method, set.slack_m, &index);
+  server::SceneState state(scene);
+  SessionTable table(served, ladder, {}, {}, &state);
+  SessionTable::Time now(1s);
+  std::uint64_t session = 0;
+  const auto say = [&](const wire::Message& m) {
+    const auto reply = table.receive("a", wire::encode(m), now);
+    const auto out = reply ? reply : table.work(now);
+    EXPECT_TRUE(out);
+    auto decoded = wire::decode(out->bytes);
+    EXPECT_TRUE(decoded);
+    return *decoded;
+  };
+  session = std::get<wire::Welcome>(say(wire::Hello{})).session;
+  for (ObjectId first = 0; first < 6000; first += 1000) {
+    wire::EditMessage edit{session, 1, {}};
+    for (ObjectId id = first; id < first + 1000; ++id)
+      edit.edits.push_back({EditKind::kRemove, id, {}, 0});
+    EXPECT_NE(std::get<wire::EditedMessage>(say(edit)).epoch, 0U);
+  }
+  auto m = std::get<wire::PvsMessage>(say(wire::PoseMessage{session, 1, 0, {4, 1, 4}, 0, 0}));
+  EXPECT_TRUE(m.everything);
+  EXPECT_EQ(m.changes.epoch, 5U);
+  EXPECT_EQ(m.changes.objects.size(), 5000U);
+  const auto told = table.notices(now + 1s);
+  ASSERT_EQ(told.size(), 1U) << "the client has to ask for the rest";
+  m = std::get<wire::PvsMessage>(say(wire::PoseMessage{session, 2, 0, {4, 1, 4}, 0, 5}));
+  EXPECT_FALSE(m.everything);
+  EXPECT_EQ(m.changes.epoch, 6U);
+  EXPECT_EQ(m.changes.since, 5U);
+  EXPECT_EQ(m.changes.objects.size(), 1000U);
+  EXPECT_TRUE(table.notices(now + 2s).empty());
 }
 
 TEST_F(Edits, OfTheSameObjectTheLastCounts) {
