@@ -52,15 +52,14 @@ std::vector<Prism> mend(const OccluderIndex& index, std::span<const Displaced> d
   for (std::uint32_t s = 0; s < set.solids.size(); ++s)
     if (const Aabb box = set.solids[s].bounds(); near_blocks(box)) near.push_back({box, s, false});
   for (const Displaced& d : displaced) {
-    std::size_t found = 0;
-    for (Near& n : near)
-      if (n.box.overlaps(d.bounds) && std::ranges::any_of(d.solids, [&](const Prism& p) {
-            return same(p, set.solids[n.solid]);
-          })) {
-        n.missing = true;
-        ++found;
-      }
-    if (found >= d.solids.size()) continue;
+    // Each by itself: one that is there twice does not stand for another that is not there.
+    const bool all_known = std::ranges::all_of(d.solids, [&](const Prism& p) {
+      bool known = false;
+      for (Near& n : near)
+        if (n.box.overlaps(d.bounds) && same(p, set.solids[n.solid])) n.missing = known = true;
+      return known;
+    });
+    if (all_known) continue;
     for (Near& n : near)
       n.missing = n.missing || n.box.overlaps(d.bounds);
   }
