@@ -94,14 +94,12 @@ void SceneState::apply_one(const Edit& edit, Time now) {
   ObjectState& s = entry.state;
   const bool was_gone = s.removed || s.moved;
   const bool moved_itself = s.speed_m_s > 0 && !s.removed;
-  const float speed_before = s.speed_m_s;
   entry.epoch = epoch_;
   switch (edit.kind) {
     case EditKind::kMove:
       s.placement = edit.placement;
       s.speed_m_s = edit.speed_m_s;
       s.moved = !same_place(o, edit.placement) || edit.speed_m_s > 0;
-      entry.slowing_m = kMoverLagS * std::max(speed_before, edit.speed_m_s);
       entry.since = now;
       entry.bounds = as_placed(o, edit.placement).bounds;
       break;
@@ -229,10 +227,8 @@ std::shared_ptr<const Amendment> SceneState::amendment(const OccluderIndex& inde
     const ObjectState& s = e.state;
     if (s.removed || !s.moved || scene_.objects[s.id].always_visible) continue;
     // Wherever it is drawn while the PVS is in use, as the edit that told of it promised.
-    const bool just_told = seconds(now - e.since) < kMoverLagS;
     const double away =
-        (s.speed_m_s > 0 ? s.speed_m_s * seconds(std::max(until, now) - e.since) : 0) +
-        std::max(kMoverLagS * s.speed_m_s, just_told ? e.slowing_m : 0);
+        s.speed_m_s > 0 ? s.speed_m_s * (seconds(std::max(until, now) - e.since) + kMoverLagS) : 0;
     Aabb box = grown(e.bounds, away);
     // All of the file lies above the floor, so does what was neither lowered nor tilted, to the
     // last bit (as_placed); and nothing that moves sinks below it.

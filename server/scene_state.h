@@ -25,7 +25,8 @@ namespace ivis::server {
 ///
 /// Guarantee: whatever may rest on matter that is not where the scene file has it hides nothing.
 ///            A mover is listed wherever it may be seen within its speed from where it was last
-///            told, kMoverLagS more included, so that clients may draw it a little late. (It does
+///            told, kMoverLagS more included, so that clients may draw it a little late; one that
+///            stopped is where it was told. (It does
 ///            not sink below the scene's lowest point, unless it was told there.)
 /// Threads:   one at a time; mending goes on in a thread of its own.
 /// Ownership: borrows the scene, and the occluders by the indices given.
@@ -70,7 +71,6 @@ class SceneState {
     ObjectState state;
     std::uint32_t epoch = 0;  ///< of its last change
     Time since{};             ///< when its placement was told
-    double slowing_m = 0;     ///< by how far it may be drawn late, as it was faster before
     Aabb bounds;              ///< as placed
   };
   /// What the edits mean to one rung.
