@@ -43,7 +43,7 @@ class Ladder {
   double slack_m() const { return slack_m_; }
   const Method& largest_method() const { return *methods_.back(); }
   const OccluderIndex* largest_index() const { return indices_.back(); }
-  /// Not for the largest, and once a rung.
+  /// Not for the largest, and once a rung; with an index as the largest has one, or without.
   void add(std::uint32_t rung, const Method& method, const OccluderIndex* index = nullptr) {
     IVIS_ASSERT((index != nullptr) == (indices_.back() != nullptr), "all rungs take edits or none");
     indices_[rung] = index;  // before the method, which tells others that the rung is there

@@ -33,7 +33,7 @@ TEST(RealTimeCity, TenMinutesAt108KmAnHourWithoutAStallOrAMiss) {
   server::World& w = **world;
   const auto reaches = server::parse_ladder("auto", w.reach, w.occluders.slack_m);
   ASSERT_TRUE(reaches);
-  server::Ladder ladder(*reaches, *w.method, w.occluders.slack_m);
+  server::Ladder ladder(*reaches, *w.method, w.occluders.slack_m, w.index.get());
   ASSERT_TRUE(server::build_rungs(w, ladder, options, {}));
   ASSERT_EQ(ladder.ready(), 4U);
 
