@@ -140,6 +140,7 @@ void ivis_client::take() {
 /// Nothing that is known of the one before says anything of another.
 void ivis_client::leave_scene() {
   ask_again_ = sequence_ != 0;
+  all_.clear();
   answer_ = {};
   states_.clear();
   untold_.clear();
@@ -256,8 +257,8 @@ const IdBits& ivis_client::all_bits() {
 
 ivis_cause ivis_client::why_outside(const Vec3& eye, Time now) const {
   if (answer_.sequence == 0) return IVIS_CAUSE_NO_ANSWER;
+  if (expired(now)) return IVIS_CAUSE_EXPIRED;  // whatever else: time is to be held
   if (!source_->connected()) return IVIS_CAUSE_DISCONNECTED;
-  if (answer_.cell.contains(eye) && expired(now)) return IVIS_CAUSE_EXPIRED;
   const Sent* s = sent(answer_.sequence);
   if (s == nullptr) return IVIS_CAUSE_LATE;
   const ivis::Pace& pace = options_.pace;
@@ -326,6 +327,8 @@ ivis_status ivis_client::view(const Vec3& eye, ivis_frame& out) {
   }
   if (sound && has_pvs && !inside && options_.policy == IVIS_POLICY_INCOMPLETE) use_pvs = true;
   if (!covered) ++stats_.uncovered_frames;
+  // Time went on while nothing held it: holding it later does not bring it back.
+  if (has_pvs && out.stalled == 0 && expired(now)) too_late_ = true;
 
   out.covered = covered ? 1 : 0;
   out.connected = source_->connected() ? 1 : 0;

@@ -292,6 +292,7 @@ int serve(const Config& config) {
     if (loaded.error().code == ErrorCode::kCancelled) return kOk;
     return report(loaded.error());
   }
+  std::unique_ptr<Generation> before;  // outlives the server, as the present one does
   std::unique_ptr<Generation> generation = std::move(*loaded);
   ServerOptions options;
   options.listen = config.listen;
@@ -316,7 +317,6 @@ int serve(const Config& config) {
   };
   build(*generation);
   Reloader reloader(config, wanted, log);
-  std::unique_ptr<Generation> before;
   (*server)->run(stop_requested, [&]() -> std::optional<Server::Served> {
     before.reset();  // the server has let go of it
     auto next = reloader.take();

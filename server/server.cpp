@@ -121,7 +121,11 @@ struct Server::Impl {
   void replace(const Served& served) {
     while (workers.under_way() > 0) {  // they borrow what was served
       zmq::pollitem_t item{nullptr, workers.fd(), ZMQ_POLLIN, 0};
-      zmq::poll(&item, 1, kLookAtStop);
+      try {
+        zmq::poll(&item, 1, kLookAtStop);
+      } catch (const zmq::error_t& e) {
+        if (e.num() != EINTR) throw;  // a signal: the workers still borrow
+      }
       for (JobDone& done : workers.take())
         if (const auto out = sessions.finish(std::move(done))) send(*out);
     }

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/server/running_server.h"
+#include "tests/support/scene_builder.h"
 
 namespace ivis::test {
 namespace {
@@ -465,7 +466,11 @@ TEST_F(ClientOverTcp, TheSameSceneLoadedAnewGoesOnWithoutTheEdits) {
 }
 
 TEST_F(ClientOverTcp, AnotherSceneIsFollowedByThoseThatSaidSo) {
-  const Scene other = grid_scene(31);
+  // Of as many words of bits as the first, but more objects.
+  SceneBuilder more;
+  for (int i = 0; i < 410; ++i)
+    more.add_box({2.0 * (i % 20), 0, 2.0 * (i / 20)}, {2.0 * (i % 20) + 1, 1, 2.0 * (i / 20) + 1});
+  const Scene other = std::move(more).finish();
   const NearMethod other_method(other);
   Replaced server(scene, other);
   auto holding = connect(server.endpoint());
@@ -486,15 +491,25 @@ TEST_F(ClientOverTcp, AnotherSceneIsFollowedByThoseThatSaidSo) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   bool covered = false;
   for (int i = 0; i < kWait && !covered; ++i) {
-    covered = following.view(eye).covered();
+    const PvsView now = following.view(eye);
+    covered = now.covered();
+    if (now.everything()) {
+      EXPECT_EQ(ids(now).size(), now.object_count());
+    }
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   EXPECT_TRUE(covered) << "by looking alone";
   ASSERT_TRUE(goes_on(following, eye)) << following.error();
   const PvsView view = following.view(eye);
   EXPECT_EQ(view.raw().scene_hash, other.hash);
-  EXPECT_EQ(view.object_count(), 31U * 31);
-  EXPECT_EQ(ids(view), solved(other_method, eye));
+  EXPECT_EQ(view.object_count(), 410U);
+  const double above[3]{10, 60, 10};
+  following.pose(above);
+  ASSERT_EQ(following.wait(kWait), IVIS_OK);
+  EXPECT_EQ(ids(following.view(above)).size(), 410U) << "everything is all of the other scene";
+  following.pose(eye);
+  ASSERT_EQ(following.wait(kWait), IVIS_OK);
+  EXPECT_EQ(ids(following.view(eye)), solved(other_method, eye));
   EXPECT_FALSE(goes_on(holding, eye));
   EXPECT_EQ(holding.status(), IVIS_ERROR_MISMATCH);
   options.scene_hash = scene.hash;

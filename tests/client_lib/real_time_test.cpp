@@ -281,6 +281,30 @@ TEST(RealTime, WhereThingsMoveByThemselvesASetRunsOutThoughTheObserverStandsStil
   }
 }
 
+TEST(RealTime, WhoIsToHoldTimeIsToldSoWhateverElseIsWrong) {
+  Observer run;
+  run.open({5ms, [](std::uint64_t) { return Duration{1ms}; }}, Observer::stalling());
+  run.source->valid_us = 100'000;
+  run.walk(60, 0);
+  ivis_frame f{};
+  run.now += 15ms;
+  EXPECT_EQ(run.client->view(Observer::at(0), f), IVIS_OK) << "the last answer is in use";
+  run.source->there = false;
+  run.now += 150ms;
+  EXPECT_EQ(run.client->view(Observer::at(0), f), IVIS_OK);
+  EXPECT_EQ(f.covered, 1);
+  EXPECT_EQ(f.cause, IVIS_CAUSE_EXPIRED) << "not disconnected alone";
+  EXPECT_EQ(run.client->view(Observer::at(300), f), IVIS_OK);
+  EXPECT_EQ(f.cause, IVIS_CAUSE_EXPIRED) << "outside as well";
+  run.client->set_policy(IVIS_POLICY_EVERYTHING);
+  EXPECT_EQ(run.client->view(Observer::at(0), f), IVIS_OK);
+  EXPECT_EQ(f.everything, 1);
+  run.client->set_policy(IVIS_POLICY_STALL);
+  EXPECT_EQ(run.client->view(Observer::at(0), f), IVIS_OK);
+  EXPECT_EQ(f.covered, 0) << "time went on in between";
+  EXPECT_EQ(f.everything, 1);
+}
+
 TEST(RealTime, ASetThatRunsOutOnItsWayIsCompleteForNobody) {
   Observer run;
   run.open({60ms, [](std::uint64_t) { return Duration{1ms}; }}, Observer::stalling());

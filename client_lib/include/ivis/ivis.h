@@ -122,7 +122,7 @@ typedef enum ivis_cause {
   IVIS_CAUSE_LATE = 5,         /* the next PVS is later than those before it were */
   IVIS_CAUSE_OTHER = 6,  /* no pace was told, nothing is measured yet, or a cell was centred by
                              prediction where the eye did not go */
-  IVIS_CAUSE_EXPIRED = 7 /* the eye is inside, but something that moves by itself may be anywhere */
+  IVIS_CAUSE_EXPIRED = 7 /* whatever else: what moves by itself may be anywhere by now */
 } ivis_cause;
 #define IVIS_CAUSES 8
 
