@@ -39,7 +39,8 @@ class OccluderIndex {
 bool is_matter(const Scene& scene, const Object& object);
 
 /// Could the object be ground, which grounded prisms and height fields rest on far from it? True
-/// for whatever is made of nothing but opaque triangles that are not steep.
+/// for whatever is made of nothing but opaque triangles that are not steep and do not lie over each
+/// other.
 /// Cost: linear in its triangles.
 bool holds_ground(const Scene& scene, const Object& object);
 

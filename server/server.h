@@ -24,9 +24,9 @@ struct ServerOptions {
 Status probe_address(const std::string& listen);
 
 /// The socket around a SessionTable: one thread that takes in everything that waits, hands jobs to
-/// the workers and sends what they bring back; it never blocks on a client, nor on a solve.
-/// Threads: bind() and run() from one thread; `stop` may be set from any, and from a signal
-/// handler. Ownership: borrows scene, ladder and log.
+/// the workers and sends what they bring back; it never blocks on a client, nor on a solve but
+/// where another scene is taken up. Threads: bind() and run() from one thread; `stop` may be set
+/// from any, and from a signal handler. Ownership: borrows scene, ladder and log.
 class Server {
  public:
   /// What is served; borrowed.

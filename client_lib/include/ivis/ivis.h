@@ -185,8 +185,8 @@ typedef struct ivis_edit {
   float speed_m_s;    /* above 0: it goes on by itself, at most so fast: wherever it is drawn at a
                          time t after the server took this edit is within speed * (t + 0.1 s) of
                          `position`, turned as told, and not below the lowest point of the scene
-                         file unless `position` is. With the view that tells of a slower speed, or of
-                         none, that counts */
+                         file unless, as told, it reaches below that. With the view that tells of a
+                         slower speed, or of    none, that counts */
 } ivis_edit;
 
 /* Asks the server to change the scene for all its clients: all `count` (1 to 1024) edits in their
