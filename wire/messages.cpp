@@ -56,18 +56,17 @@ fb::Change to_fb(const ObjectState& s) {
                s.speed_m_s);
 }
 
+Placement placement_of(const fb::Change& c) {
+  return {from_fb(c.position()), {c.rotation_w(), c.rotation_x(), c.rotation_y(), c.rotation_z()}};
+}
+
 Status check(const fb::Change& c) {
-  const Placement p{from_fb(c.position()),
-                    {c.rotation_w(), c.rotation_x(), c.rotation_y(), c.rotation_z()}};
-  if (!p.valid())
+  if (!placement_of(c).valid())
     return input_error("object " + std::to_string(c.id()) +
                        ": a position not finite or beyond 1e9 m, or a rotation that is none");
   if (!(c.speed() >= 0 && c.speed() <= kFastestMoverMs))
     return input_error("object " + std::to_string(c.id()) + ": a speed not from 0 to 1000 m/s");
   return ok();
-}
-Placement placement_of(const fb::Change& c) {
-  return {from_fb(c.position()), {c.rotation_w(), c.rotation_x(), c.rotation_y(), c.rotation_z()}};
 }
 
 // ---- encoding: one function a message, children before the envelope ----
