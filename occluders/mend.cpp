@@ -10,10 +10,6 @@
 namespace ivis {
 namespace {
 
-Box2 flat(const Aabb& box) {
-  return {{box.lo.x, box.lo.z}, {box.hi.x, box.hi.z}};
-}
-
 bool same(const Prism& a, const Prism& b) {
   return a.bottom == b.bottom && a.top == b.top && a.footprint.rings == b.footprint.rings;
 }
@@ -38,10 +34,11 @@ std::vector<Prism> mend(const OccluderIndex& index, std::span<const Displaced> d
   std::vector<Box2> blocks;  // of the prisms that are out of use, which all reach down
   for (const Displaced& d : displaced)
     for (const std::uint32_t i : index.touched(d.bounds))
-      blocks.push_back(flat(index.box(i)));
+      blocks.push_back(ground_box(index.box(i)));
   const RectTree tree(blocks);
   const auto near_blocks = [&](const Aabb& box) {
-    return !tree.all(flat(box), [&](std::uint32_t b) { return !blocks[b].overlaps(flat(box)); });
+    return !tree.all(ground_box(box),
+                     [&](std::uint32_t b) { return !blocks[b].overlaps(ground_box(box)); });
   };
   struct Near {
     Aabb box;

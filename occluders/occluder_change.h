@@ -17,7 +17,7 @@ class DisplacedMatter {
   explicit DisplacedMatter(std::vector<Aabb> boxes) : boxes_(std::move(boxes)) {
     std::vector<Box2> flat;
     for (const Aabb& b : boxes_)
-      flat.push_back({{b.lo.x, b.lo.z}, {b.hi.x, b.hi.z}});
+      flat.push_back(ground_box(b));
     tree_ = RectTree(flat);
   }
   /// May what backs an object with these bounds be missing? Backing matter holds the object's place
@@ -26,7 +26,7 @@ class DisplacedMatter {
   bool near(const Aabb& bounds) const {
     constexpr double kNearM = 1.6;
     const Aabb about{bounds.lo - kNearM, bounds.hi + kNearM};
-    return !tree_.all({{about.lo.x, about.lo.z}, {about.hi.x, about.hi.z}},
+    return !tree_.all(ground_box(about),
                       [&](std::uint32_t i) { return !boxes_[i].overlaps(about); });
   }
 

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <vector>
 
+#include "core/aabb.h"
 #include "core/math.h"
 
 namespace ivis {
@@ -33,6 +34,11 @@ struct Box2 {
   }
   Vec2 size() const { return hi - lo; }
 };
+
+/// What the box covers of the ground plane.
+inline Box2 ground_box(const Aabb& box) {
+  return {ground(box.lo), ground(box.hi)};
+}
 
 /// Items by their boxes, split at the median: linear memory whatever the boxes are.
 /// Threads: a value; `all` is reentrant.

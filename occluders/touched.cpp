@@ -12,10 +12,6 @@ namespace {
 /// More than the tolerances by which W is larger than the reach, and than bounds are rounded by.
 constexpr double kMoreM = 0.05;
 
-Box2 ground_box(const Aabb& box) {
-  return {{box.lo.x, box.lo.z}, {box.hi.x, box.hi.z}};
-}
-
 }  // namespace
 
 OccluderIndex::OccluderIndex(const OccluderSet& set)

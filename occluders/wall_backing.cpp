@@ -141,7 +141,7 @@ class WallBacker {
     std::optional<Backing> best;
     std::vector<std::uint32_t> near;
     const Vec3 centre = object.bounds.centre();
-    tree_.all({ground(object.bounds.lo), ground(object.bounds.hi)}, [&](std::uint32_t w) {
+    tree_.all(ground_box(object.bounds), [&](std::uint32_t w) {
       // The middle of what stands out this little is this near.
       const PlaneFrame& f = walls_[w].frame;
       if (std::abs(glm::dot(f.n, centre - f.origin)) <= kMostOutM &&
