@@ -102,7 +102,7 @@ int main(int argc, char** argv) {
     ivis_client_options options = ivis_client_options_default();
     options.endpoint = argv[1];
     options.policy = IVIS_POLICY_STALL;
-    options.pace = {speed * 1.01, 0.01, 1 / fps};
+    options.pace = {speed * 1.01, 0.01, 1 / fps, 0};
     char error[256];
     if (ivis_client_connect(&options, &all[i].client, error, sizeof error) != IVIS_OK) {
       std::fprintf(stderr, "many_clients: client %zu: %s\n", i, error);

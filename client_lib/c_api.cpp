@@ -20,13 +20,14 @@ ivis::Vec3 vec(const double p[3]) {
 }
 
 constexpr const char* kBadPace =
-    "a pace out of bounds, expected speeds of 0 to 1e6 m/s and frames of 0 to 3600 s";
+    "a pace out of bounds, expected speeds of 0 to 1e6 m/s and frames of 0 to 3600 s, "
+    "turning of 0 to 1e6 rad/s";
 
 constexpr std::uint32_t kMostLingerFrames = 3600;
 constexpr std::size_t kMostEdits = 1024;  // a message takes no more
 
 ivis::Pace pace_of(const ivis_pace& p) {
-  return {p.horizontal_m_s, p.vertical_m_s, p.frame_s};
+  return {p.horizontal_m_s, p.vertical_m_s, p.frame_s, p.turning_rad_s};
 }
 
 /// Out of memory is all that may be thrown inside; the caller is C.

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numbers>
 #include <utility>
 
 #include "client_lib/clamp.h"
+#include "core/view_cell.h"
 
 using ivis::Vec3;
+using ivis::ViewCell;
 using ivis::client::IdBits;
 
 namespace {
@@ -197,27 +200,52 @@ std::optional<ivis::client::EditResult> ivis_client::edited() {
 ivis_status ivis_client::pose(const Vec3& eye) {
   if (!finite(eye)) return fail(IVIS_ERROR_ARGUMENT, "an eye that is not finite");
   take();  // first: the pose acknowledges what has arrived
-  const Time now = options_.now();
-  Vec3 centre = eye;
-  const Sent* before = sent(sequence_);
-  if (options_.predict && before != nullptr && now > before->at) {
-    // To the middle of where the PVS will be in use, if the observer goes on as it went.
-    const Vec3 velocity = (eye - before->eye) / seconds(now - before->at);
-    Vec3 ahead = velocity * (seconds(clock_.latency() + clock_.hold()) / 2);
-    // A leap is no velocity: what no cell could hold is not gone towards.
-    const ivis::client::Catalogue* c = source_->catalogue();
-    const double most = c != nullptr ? c->reaches.back().half_extents().x : 0;
-    const double length = glm::length(ahead);
-    if (std::isfinite(length) && length > most) ahead *= most / length;
-    if (std::isfinite(length) && finite(eye + ahead)) centre = eye + ahead;
-  }
+  const auto hold = std::chrono::ceil<std::chrono::microseconds>(clock_.hold()).count();
+  Sent next{sequence_ + 1, options_.now(), eye,
+            static_cast<std::uint32_t>(std::clamp<std::int64_t>(hold, 0, UINT32_MAX))};
+  const Vec3 centre = eye + (options_.predict ? ahead_of(next) : Vec3{0});
   ++sequence_;
   ++stats_.poses;
-  const auto hold = std::chrono::ceil<std::chrono::microseconds>(clock_.hold()).count();
-  const auto hold_us = static_cast<std::uint32_t>(std::clamp<std::int64_t>(hold, 0, UINT32_MAX));
-  sent_[sequence_ % sent_.size()] = {sequence_, now, eye, hold_us};
-  source_->send({sequence_, centre, hold_us});
+  sent_[sequence_ % sent_.size()] = next;
+  ivis::client::Request request{sequence_, centre, next.hold_us};
+  if (next.way) request.observer = eye;
+  source_->send(request);
   return state();
+}
+
+/// From the eye to where its cell is centred, if the observer goes on as it went: to the middle of
+/// where it may get to by its turning, or, if it told none, of where it would be while the PVS is
+/// in use. A leap is no velocity, and of hardly any movement the direction is noise: then cells lie
+/// about the eye.
+Vec3 ivis_client::ahead_of(Sent& pose) const {
+  constexpr double kLeast = 0.05;  // of the fastest told, to be a direction
+  constexpr double kMost = 1.5;    // likewise, and of the frame that a direction may be old
+  const Sent* before = sent(sequence_);
+  const ivis::client::Catalogue* c = source_->catalogue();
+  if (before == nullptr || pose.at <= before->at || c == nullptr) return Vec3{0};
+  const double passed = seconds(pose.at - before->at);
+  const Vec3 moved = pose.eye - before->eye;
+  Vec3 ahead{0};
+  if (const ivis::Pace& pace = options_.pace; pace.turning_rad_s > 0) {
+    const double fastest = std::hypot(pace.horizontal_m_s, pace.vertical_m_s) * passed;
+    const double length = glm::length(moved);
+    if (!(passed <= kMost * pace.frame_s && length >= kLeast * fastest &&
+          length <= kMost * fastest))
+      return Vec3{0};
+    pose.way = ivis::way_ahead(pace, moved, pose.hold_us * 1e-6);
+    if (!pose.way) return Vec3{0};
+    ahead = pose.way->direction * pose.way->middle();
+  } else {
+    ahead = moved / passed * (seconds(clock_.latency() + clock_.hold()) / 2);
+  }
+  // The eye is in its cell, at least while that is the largest.
+  const ViewCell largest{Vec3{0}, c->reaches.back()};
+  double part = finite(ahead) && largest.contains(-ahead) ? 1 : 0;
+  for (double step = part == 1 ? 0 : 0.5; step > 1e-3; step /= 2)
+    if (largest.contains(-ahead * (part + step))) part += step;
+  if (part > 0 && finite(pose.eye + ahead * part)) return ahead * part;
+  pose.way.reset();
+  return Vec3{0};
 }
 
 ivis_status ivis_client::wait(std::chrono::milliseconds timeout) {
@@ -268,6 +296,10 @@ ivis_cause ivis_client::why_outside(const Vec3& eye, Time now) const {
   constexpr double kMore = 1.001;
   if (std::hypot(moved.x, moved.z) > pace.horizontal_m_s * age_s * kMore + 1e-3 ||
       std::abs(moved.y) > pace.vertical_m_s * age_s * kMore + 1e-3)
+    return IVIS_CAUSE_SPEED;
+  const double turned = pace.turning_rad_s * (age_s + pace.frame_s) * kMore;
+  if (s->way && turned < std::numbers::pi &&
+      glm::dot(moved, s->way->direction) < std::cos(turned) * glm::length(moved) - 1e-3)
     return IVIS_CAUSE_SPEED;
   if (answer_.safe < 1) return IVIS_CAUSE_LADDER;
   return age_s * 1e6 > s->hold_us ? IVIS_CAUSE_LATE : IVIS_CAUSE_OTHER;

@@ -15,6 +15,7 @@
 #include "client_lib/lingering.h"
 #include "client_lib/source.h"
 #include "client_lib/visibility_clock.h"
+#include "core/way_ahead.h"
 
 /// Behind the C interface. Threads: one at a time.
 struct ivis_client {
@@ -65,8 +66,10 @@ struct ivis_client {
     Time at;
     ivis::Vec3 eye{0};
     std::uint32_t hold_us = 0;
+    std::optional<ivis::WayAhead> way{};  ///< that its cell was centred by
   };
   const Sent* sent(std::uint32_t sequence) const;
+  ivis::Vec3 ahead_of(Sent& pose) const;
 
   std::unique_ptr<ivis::client::PvsSource> source_;
   Options options_;

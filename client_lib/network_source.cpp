@@ -100,7 +100,8 @@ struct NetworkSource::Impl {
     if (!waiting_since) waiting_since = now;  // also while the pose cannot leave
     const Eye& eye = eyes[sequence % kRememberedEyes];
     // What is not known as a base is not acknowledged: the answer then is a full set.
-    if (!put(wire::PoseMessage{session, sequence, history.newest(), eye.at, hold_us, have_epoch}))
+    if (!put(wire::PoseMessage{session, sequence, history.newest(), eye.at, hold_us, have_epoch,
+                               observer}))
       return;
     pose_due = false;
   }
@@ -331,6 +332,7 @@ struct NetworkSource::Impl {
   std::uint32_t sequence = 0;     ///< of the latest pose
   std::uint32_t answered = 0;     ///< of the latest pose that was
   std::uint32_t hold_us = 0;      ///< likewise
+  std::optional<Vec3> observer;   ///< likewise
   std::uint32_t have_epoch = 0;   ///< of the newest PVS of the session
   std::uint32_t known_epoch = 0;  ///< heard of in the session
   std::uint32_t requests = 0;
@@ -397,6 +399,7 @@ const Catalogue* NetworkSource::catalogue() const {
 void NetworkSource::send(const Request& request) {
   impl_->sequence = request.sequence;
   impl_->hold_us = request.hold_us;
+  impl_->observer = request.observer;
   impl_->eyes[request.sequence % kRememberedEyes] = {request.sequence, request.centre};
   impl_->pose_due = true;
   impl_->pump();

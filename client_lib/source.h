@@ -76,6 +76,8 @@ struct Request {
   std::uint32_t sequence = 0;
   Vec3 centre{0};             ///< of the cell
   std::uint32_t hold_us = 0;  ///< for how long the PVS should hold; 0: unknown
+  /// Where the observer is, when the centre lies ahead of it by its turning; none: no matter.
+  std::optional<Vec3> observer{};
 };
 
 struct SourceStats {

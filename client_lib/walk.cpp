@@ -365,6 +365,9 @@ Result<WalkReport> walk(const std::string& endpoint, const std::vector<Pose>& pa
   if (!within(options.seconds, 1e6) || !within(options.speed_limit_m_s, 1e6))
     return invalid_argument("seconds " + std::to_string(options.seconds) + ", speed limit " +
                             std::to_string(options.speed_limit_m_s) + ", expected 0 to 1e6");
+  if (!within(options.turning_rad_s, 1e6))
+    return invalid_argument("turning " + std::to_string(options.turning_rad_s) +
+                            " rad/s, expected 0 to 1e6");
   if (!within(options.budget_ms, 1e6))
     return invalid_argument("budget " + std::to_string(options.budget_ms) +
                             " ms, expected 0 to 1e6");
@@ -389,6 +392,7 @@ Result<WalkReport> walk(const std::string& endpoint, const std::vector<Pose>& pa
         options.speed_limit_m_s > 0 ? std::min(options.speed_limit_m_s, own) : own;
     wanted.pace.vertical_m_s = played->vertical_m_s();
     wanted.pace.frame_s = 1 / options.fps;
+    wanted.pace.turning_rad_s = options.turning_rad_s;
   }
   ivis_client* raw = nullptr;
   char text[512] = "";

@@ -32,6 +32,7 @@ struct WalkOptions {
   std::optional<Strategy> strategy;                  ///< none: the server's
   double budget_ms = 0;                              ///< of one solve; 0: the server's
   bool predict = false;                              ///< centre cells where the observer is going
+  double turning_rad_s = 0;                          ///< with fps: told, as ivis_pace; 0: not
   std::optional<std::filesystem::path> record_file;  ///< client_lib/record.h
   SceneHash scene_hash = 0;                          ///< 0: the server's
   std::string reach;                                 ///< empty: the server's

@@ -6,6 +6,7 @@
 
 #include "core/assert.h"
 #include "core/view_cell.h"
+#include "core/way_ahead.h"
 #include "wire/messages.h"
 
 namespace ivis::server {
@@ -48,36 +49,53 @@ std::uint32_t Ladder::ready() const {
       std::count_if(methods_.begin(), methods_.end(), [](const auto& m) { return m != nullptr; }));
 }
 
-Ladder::Choice Ladder::choose(const Reach& wanted) const {
-  for (std::uint32_t i = 0; i < reaches_.size(); ++i)
-    if (const Method* m = methods_[i]; m != nullptr && serves(reaches_[i], slack_m_, wanted))
-      return {i, m, indices_[i], 1};
+Outlook::Outlook(const Pace& pace, std::uint32_t hold_us, const Vec3& observer) {
+  if (!pace.told() || hold_us == 0) return;
+  const double hold_s = hold_us * 1e-6;
+  if (const auto way = way_ahead(pace, -observer, hold_s)) {
+    ahead_ = way->hull();
+    observer_ = observer;
+    height_ = way->height;
+  } else {
+    about_ = Reach::cylinder(pace.horizontal_m_s * hold_s, pace.vertical_m_s * hold_s);
+  }
+}
+
+// A convex reach holds the hull of points that it holds. An upright one holds what it holds from
+// above and from the side, so that heights may be cut to the vertical speed.
+bool Ladder::holds(const Reach& reach, const Outlook& wanted, double part) const {
+  if (wanted.ahead_.empty()) {
+    const Vec3 e = wanted.about_->half_extents() * part;
+    return serves(reach, slack_m_, part == 1 ? *wanted.about_ : Reach::cylinder(e.x, e.y));
+  }
+  const bool upright =
+      reach.kind() != Reach::Kind::kBall && reach.kind() != Reach::Kind::kEllipsoid;
+  const ViewCell cell{Vec3{0}, reach};
+  return std::ranges::all_of(wanted.ahead_, [&](Vec3 p) {
+    if (upright) p.y = std::clamp(p.y, -wanted.height_, wanted.height_);
+    return cell.contains(wanted.observer_ + p * part);
+  });
+}
+
+Ladder::Choice Ladder::choose(const Outlook& wanted) const {
   const auto last = static_cast<std::uint32_t>(reaches_.size() - 1);
+  if (wanted.about_ || !wanted.ahead_.empty()) {
+    for (std::uint32_t i = 0; i < reaches_.size(); ++i)
+      if (const Method* m = methods_[i]; m != nullptr && holds(reaches_[i], wanted, 1))
+        return {i, m, indices_[i], 1};
+  }
   return {last, methods_[last], indices_[last], safe_part(reaches_[last], wanted)};
 }
 
-double Ladder::safe_part(const Reach& reach, const Reach& wanted) const {
-  if (serves(reach, slack_m_, wanted)) return 1;
-  const Vec3 e = wanted.half_extents();
+double Ladder::safe_part(const Reach& reach, const Outlook& wanted) const {
+  if ((!wanted.about_ && wanted.ahead_.empty()) || holds(reach, wanted, 1)) return 1;
   double safe = 0;
   double not_safe = 1;
   for (int i = 0; i < 24; ++i) {
     const double middle = (safe + not_safe) / 2;
-    const Reach part = Reach::cylinder(e.x * middle, e.y * middle);
-    (serves(reach, slack_m_, part) ? safe : not_safe) = middle;
+    (holds(reach, wanted, middle) ? safe : not_safe) = middle;
   }
   return safe;
-}
-
-Reach reach_of(const Pace& pace, std::uint32_t hold_us) {
-  const double hold_s = hold_us * 1e-6;
-  return Reach::cylinder(pace.horizontal_m_s * hold_s, pace.vertical_m_s * hold_s);
-}
-
-Ladder::Choice Ladder::choose(const Pace& pace, std::uint32_t hold_us) const {
-  if (!pace.told() || hold_us == 0)
-    return {static_cast<std::uint32_t>(reaches_.size() - 1), methods_.back(), indices_.back(), 1};
-  return choose(reach_of(pace, hold_us));
 }
 
 std::vector<Reach> ladder_below(const Reach& largest, std::size_t count) {

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -14,6 +15,26 @@
 #include "visibility/method.h"
 
 namespace ivis::server {
+
+/// Where an observer may get to while a PVS is in use, seen from the centre of its cell.
+class Outlook {
+ public:
+  /// Nothing is known: anywhere.
+  Outlook() = default;
+  /// Within `hold_us` past its pose, at `pace`: an upright cylinder about the centre, for a walker,
+  /// or, where it told how it turns and that it is at `observer`, seen from the centre, what lies
+  /// ahead of it (core/way_ahead.h). Speeds not told, or hold_us 0 (not known yet): anywhere.
+  Outlook(const Pace& pace, std::uint32_t hold_us, const Vec3& observer = Vec3{0});
+  /// Anywhere in a reach.
+  explicit Outlook(const Reach& about) : about_(about) {}
+
+ private:
+  friend class Ladder;
+  std::optional<Reach> about_;
+  std::vector<Vec3> ahead_;  ///< seen from the observer; not empty: instead of about_
+  Vec3 observer_{0};
+  double height_ = 0;  ///< most, up or down from the observer
+};
 
 /// Reaches that cells can be solved for, ascending, each with a method on occluders shrunk for it
 /// once that is ready: the smaller the cell, the smaller the set. The largest is ready from the
@@ -51,24 +72,20 @@ class Ladder {
   }
   std::uint32_t ready() const;
 
-  /// The part of `wanted` that cells of `reach` hold, rounded down; 1: all.
-  double safe_part(const Reach& reach, const Reach& wanted) const;
-  /// The smallest ready rung whose cells hold `wanted`; if none does, the largest, with the part of
-  /// `wanted` that it holds, rounded down.
-  Choice choose(const Reach& wanted) const;
-  /// For reach_of(pace, hold_us). Told nothing, or with hold_us 0 (not known yet), the largest.
-  Choice choose(const Pace& pace, std::uint32_t hold_us) const;
+  /// The smallest ready rung whose cells hold what is wanted; if none does, the largest, with the
+  /// part of the speeds that it holds, rounded down.
+  Choice choose(const Outlook& wanted) const;
+  /// Those speeds' part that cells of `reach` hold.
+  double safe_part(const Reach& reach, const Outlook& wanted) const;
 
  private:
+  bool holds(const Reach& reach, const Outlook& wanted, double part) const;
+
   std::vector<Reach> reaches_;
   double slack_m_;
   std::vector<std::atomic<const Method*>> methods_;
   std::vector<const OccluderIndex*> indices_;
 };
-
-/// Where an observer may get to at `pace` while a PVS is in use, `hold_us` past its pose: an
-/// upright cylinder.
-Reach reach_of(const Pace& pace, std::uint32_t hold_us);
 
 /// `count` reaches up to `largest`, each kLadderStep of the next in its horizontal extents; the
 /// vertical extent stays, as it costs next to nothing, but for balls, which stay balls.

@@ -131,11 +131,12 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
     return refuse_unknown(peer, pose.session);
   Session& session = found->second;
   session.heard = now;
-  if (!finite(pose.eye) || pose.sequence == 0) {
+  if (!finite(pose.eye) || !finite(pose.observer.value_or(pose.eye)) || pose.sequence == 0) {
     ++counters_.malformed;
     forget(peer);
-    return refuse(peer, pose.session, wire::Refusal::kMalformed,
-                  pose.sequence == 0 ? "a pose with sequence 0" : "an eye that is not finite");
+    return refuse(
+        peer, pose.session, wire::Refusal::kMalformed,
+        pose.sequence == 0 ? "a pose with sequence 0" : "an eye or observer that is not finite");
   }
   if (pose.sequence <= session.last_sequence) return std::nullopt;  // none is answered twice
   session.last_sequence = pose.sequence;
@@ -299,14 +300,13 @@ std::vector<std::byte> SessionTable::welcome(Session& session) {
   return wire::encode(w, scene_->packed_table);
 }
 
-Ladder::Choice SessionTable::choose(const Session& session, std::uint32_t hold_us) const {
+Ladder::Choice SessionTable::choose(const Session& session, const wire::PoseMessage& pose) const {
+  const Outlook wanted(session.pace, pose.hold_us, pose.observer.value_or(pose.eye) - pose.eye);
   // A named reach always by the same occluders: equal poses get equal sets.
   if (session.reach)
     return {0, &ladder_->largest_method(), ladder_->largest_index(),
-            session.pace.told()
-                ? ladder_->safe_part(*session.reach, reach_of(session.pace, hold_us))
-                : 1};
-  return ladder_->choose(session.pace, hold_us);
+            ladder_->safe_part(*session.reach, wanted)};
+  return ladder_->choose(wanted);
 }
 
 Job SessionTable::answer(Peers::value_type& peer, Time now) {
@@ -321,7 +321,7 @@ Job SessionTable::answer(Peers::value_type& peer, Time now) {
   passed_over_ += (std::min(session.passed_over, kMostPassedOver) - passed_over_) / kLookBack;
   session.passed_over = 0;
 
-  const Ladder::Choice choice = choose(session, pose.hold_us);
+  const Ladder::Choice choice = choose(session, pose);
   if (choice.safe < 1) ++counters_.beyond_ladder;
   Job job;
   job.peer = peer.first;
@@ -361,7 +361,7 @@ void SessionTable::add_changes(const Ladder::Choice& choice, const wire::PoseMes
   changes.since = told.since;
   changes.objects = std::move(told.objects);
   // A client that is behind by very much is brought on in steps, and sees everything meanwhile.
-  job.everything = told.epoch != state_->epoch();
+  job.everything = told.epoch != state_->epoch() || state_->torn();
   Time until = now;
   if (state_->moves()) {
     const auto wanted = pose.hold_us == 0
@@ -371,7 +371,7 @@ void SessionTable::add_changes(const Ladder::Choice& choice, const wire::PoseMes
     changes.valid_us = static_cast<std::uint32_t>(valid.count());
     until += valid;
   }
-  job.amendment = state_->amendment(*choice.index, now, until);
+  if (!job.everything) job.amendment = state_->amendment(*choice.index, now, until);
 }
 
 std::size_t SessionTable::remembered_limit() const {
@@ -410,23 +410,23 @@ std::size_t SessionTable::expire(Time now) {
 }
 
 std::vector<Outgoing> SessionTable::end_all(wire::Refusal reason, const std::string& text) {
-  std::vector<Outgoing> out;
-  for (const auto& [peer, session] : sessions_)
-    out.push_back(refuse(peer, session.id, reason, text));
-  sessions_.clear();
+  Peers ended;
+  ended.swap(sessions_);
   waiting_.clear();
+  std::vector<Outgoing> out;
+  for (const auto& [peer, session] : ended)
+    out.push_back(refuse(peer, session.id, reason, text));
   return out;
 }
 
 std::vector<Outgoing> SessionTable::replace(const ServedScene& scene, const Ladder& ladder,
                                             const CostModel& cost, SceneState* state) {
-  auto out = end_all(wire::Refusal::kSession, "the scene was loaded anew: say Hello again");
   scene_ = &scene;
   ladder_ = &ladder;
   cost_ = cost;
   state_ = state;
   noticed_epoch_ = 0;
-  return out;
+  return end_all(wire::Refusal::kSession, "the scene was loaded anew: say Hello again");
 }
 
 std::vector<Outgoing> SessionTable::close() {

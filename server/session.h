@@ -154,7 +154,7 @@ class SessionTable {
   Job answer(Peers::value_type& peer, Time now);
   void add_changes(const Ladder::Choice& choice, const wire::PoseMessage& pose, Time now,
                    Job& job) const;
-  Ladder::Choice choose(const Session& session, std::uint32_t hold_us) const;
+  Ladder::Choice choose(const Session& session, const wire::PoseMessage& pose) const;
   void remember(Session& session, std::uint32_t sequence,
                 std::shared_ptr<const wire::PvsState> state);
   /// May its latest pose be passed over for the next one, which is a frame later?

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <iostream>
 #include <memory>
+#include <numbers>
 
 #include <unistd.h>
 
@@ -22,6 +23,7 @@ struct WalkArgs {
   double seconds = 0;
   double speed_limit = 0;
   bool predict = false;
+  double turning_deg_s = 0;
   std::string strategy;
   double budget_ms = 0;
   bool json = false;
@@ -52,7 +54,8 @@ Outcome run_walk(const WalkArgs& args) {
   options.fps = args.fps;
   options.seconds = args.seconds;
   options.speed_limit_m_s = args.speed_limit;
-  options.predict = args.predict;
+  options.predict = args.predict || args.turning_deg_s > 0;
+  options.turning_rad_s = args.turning_deg_s * std::numbers::pi / 180;
   options.strategy = parse_strategy(args.strategy);
   options.budget_ms = args.budget_ms;
   options.hz = args.hz;
@@ -161,6 +164,12 @@ void add_walk(CLI::App& app, std::function<Outcome()>& action) {
   sub->add_flag("--predict", args->predict,
                 "centre cells where the observer is going instead of where it is")
       ->needs(fps);
+  sub->add_option("--turning", args->turning_deg_s,
+                  "by how much the direction of travel turns at most, as a vehicle's, which makes "
+                  "cells ahead smaller; implies --predict")
+      ->needs(fps)
+      ->type_name("DEG_S")
+      ->check(number_within(0, 1e6));
   sub->add_option("--hz", args->hz,
                   "rows of the path a second; 0: as fast as answers come, each pose waits for its "
                   "own")

@@ -29,14 +29,15 @@ fb::Vec3 to_fb(const Vec3& v) {
 Vec3 from_fb(const fb::Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
-fb::Speeds to_fb(const Pace& p) {
+fb::Speeds speeds_of(const Pace& p) {
   IVIS_ASSERT(p.valid(), "speeds are finite and within bounds");
   return {p.horizontal_m_s, p.vertical_m_s, p.frame_s};
 }
-Result<Pace> from_fb(const fb::Speeds& s) {
-  const Pace pace{s.horizontal(), s.vertical(), s.frame()};
+Result<Pace> pace_of(const fb::Speeds& s, double turning) {
+  const Pace pace{s.horizontal(), s.vertical(), s.frame(), turning};
   if (!pace.valid())
-    return input_error("speeds: not finite, negative, above 1e6 m/s or frames above an hour");
+    return input_error(
+        "speeds: not finite, negative, above 1e6 m/s or rad/s, or frames above an hour");
   return pace;
 }
 
@@ -79,10 +80,11 @@ flatbuffers::Offset<flatbuffers::String> put_string(FlatBufferBuilder& b, std::s
 
 flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Hello& m) {
   const auto reach = put_string(b, m.reach, kMaxNameBytes);
-  const fb::Speeds speeds = to_fb(m.pace);
+  const fb::Speeds speeds = speeds_of(m.pace);
   const auto hello = fb::CreateHello(
       b, m.version, m.want_table, m.scene_hash, reach, m.pace == Pace{} ? nullptr : &speeds,
-      static_cast<std::uint8_t>(m.strategy ? 1 + static_cast<int>(*m.strategy) : 0), m.budget_us);
+      static_cast<std::uint8_t>(m.strategy ? 1 + static_cast<int>(*m.strategy) : 0), m.budget_us,
+      m.pace.turning_rad_s);
   fb::EnvelopeBuilder e(b);
   e.add_hello(hello);
   return e.Finish();
@@ -114,10 +116,12 @@ flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Welcome& m) {
 }
 
 flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const PoseMessage& m) {
-  IVIS_ASSERT(finite(m.eye), "a pose is finite");
+  IVIS_ASSERT(finite(m.eye) && (!m.observer || finite(*m.observer)), "a pose is finite");
   const fb::Pose pose(m.session, m.sequence, m.have_pvs, to_fb(m.eye), m.hold_us, m.epoch);
+  const fb::Vec3 observer = to_fb(m.observer.value_or(Vec3{0}));
   fb::EnvelopeBuilder e(b);
   e.add_pose(&pose);
+  if (m.observer) e.add_observer(&observer);
   return e.Finish();
 }
 
@@ -164,7 +168,7 @@ flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const Bye& m) {
 }
 
 flatbuffers::Offset<fb::Envelope> put(FlatBufferBuilder& b, const PaceMessage& m) {
-  const fb::Pace pace(m.session, to_fb(m.pace));
+  const fb::Pace pace(m.session, speeds_of(m.pace), m.pace.turning_rad_s);
   fb::EnvelopeBuilder e(b);
   e.add_pace(&pace);
   return e.Finish();
@@ -211,11 +215,9 @@ Status check_string(const flatbuffers::String* s, std::size_t limit, const char*
 Result<Message> get(const fb::Hello& m) {
   if (const auto s = check_string(m.reach(), kMaxNameBytes, "hello: reach"); !s) return s.error();
   Hello out{m.version(), m.scene_hash(), text_of(m.reach()), m.want_table(), {}, {}, m.budget_us()};
-  if (m.speeds() != nullptr) {
-    const auto pace = from_fb(*m.speeds());
-    if (!pace) return pace.error();
-    out.pace = *pace;
-  }
+  const auto pace = pace_of(m.speeds() != nullptr ? *m.speeds() : fb::Speeds(0, 0, 0), m.turning());
+  if (!pace) return pace.error();
+  out.pace = *pace;
   if (m.strategy() > 1 + static_cast<int>(Strategy::kPredictive))
     return input_error("hello: unknown strategy " + std::to_string(m.strategy()));
   if (m.strategy() > 0) out.strategy = static_cast<Strategy>(m.strategy() - 1);
@@ -248,11 +250,13 @@ Result<Message> get(const fb::Welcome& m) {
   return Message(std::move(out));
 }
 
-Result<Message> get(const fb::Pose& m) {
-  const Vec3 eye = from_fb(m.eye());
-  if (!finite(eye))
-    return input_error("pose " + std::to_string(m.sequence()) + ": eye is not finite");
-  return Message(PoseMessage{m.session(), m.sequence(), m.have_pvs(), eye, m.hold_us(), m.epoch()});
+Result<Message> get(const fb::Envelope& e, const fb::Pose& m) {
+  PoseMessage out{m.session(), m.sequence(), m.have_pvs(), from_fb(m.eye()), m.hold_us(), m.epoch(),
+                  {}};
+  if (e.observer() != nullptr) out.observer = from_fb(*e.observer());
+  if (!finite(out.eye) || (out.observer && !finite(*out.observer)))
+    return input_error("pose " + std::to_string(m.sequence()) + ": eye or observer is not finite");
+  return Message(out);
 }
 
 Result<SceneChanges> get(const fb::Changes& m) {
@@ -337,8 +341,10 @@ Result<Message> get(const fb::Envelope& e) {
   if (e.pvs() == nullptr &&
       (e.payload() != nullptr || e.centre() != nullptr || e.changes() != nullptr))
     return input_error("message: a payload, centre or changes without a pvs");
+  if (e.pose() == nullptr && e.observer() != nullptr)
+    return input_error("message: an observer without a pose");
   if (e.pvs() != nullptr) return get(e, *e.pvs());
-  if (e.pose() != nullptr) return get(*e.pose());
+  if (e.pose() != nullptr) return get(e, *e.pose());
   if (e.hello() != nullptr) return get(*e.hello());
   if (e.welcome() != nullptr) return get(*e.welcome());
   if (e.refused() != nullptr) return get(*e.refused());
@@ -347,7 +353,7 @@ Result<Message> get(const fb::Envelope& e) {
   if (e.notice() != nullptr)
     return Message(NoticeMessage{e.notice()->session(), e.notice()->epoch()});
   if (e.pace() != nullptr) {
-    const auto pace = from_fb(e.pace()->speeds());
+    const auto pace = pace_of(e.pace()->speeds(), e.pace()->turning());
     if (!pace) return pace.error();
     return Message(PaceMessage{e.pace()->session(), *pace});
   }

@@ -20,7 +20,7 @@
 
 namespace ivis::wire {
 
-inline constexpr std::uint16_t kProtocolVersion = 3;
+inline constexpr std::uint16_t kProtocolVersion = 4;
 
 /// Client -> server, first.
 struct Hello {
@@ -69,11 +69,14 @@ struct PoseMessage {
   std::uint32_t sequence = 0;  ///< rises by one a pose
   /// Sequence of the last PVS decoded, 0: none; acknowledges it as a base.
   std::uint32_t have_pvs = 0;
-  Vec3 eye{0};
+  Vec3 eye{0};  ///< of the cell wanted
   /// How long a PVS is in use past its pose, as the client measures it; 0: unknown. With the speeds
   /// told it decides the cell.
   std::uint32_t hold_us = 0;
   std::uint32_t epoch = 0;  ///< of the scene as the client has it; 0: as in the file
+  /// Where the observer is, when the eye is ahead of it on the line that it travels. Costs 26
+  /// bytes.
+  std::optional<Vec3> observer{};
   bool operator==(const PoseMessage&) const = default;
 };
 

@@ -574,7 +574,7 @@ TEST_F(ClientOverTcp, AfterARestartCellsAreOfTheNewServersLadder) {
   options.endpoint = address.c_str();
   options.connect_timeout_ms = kWait;
   options.silence_timeout_ms = 200;
-  options.pace = {1, 0, 0.01};
+  options.pace = {1, 0, 0.01, 0};
   std::optional<RunningServer> server;
   server.emplace(scene, ladder({0.5, 1, 3}), address);
   auto client = VisibilityClient::connect(options);
@@ -626,7 +626,7 @@ TEST(ClientOptions, OfRealTimeAreChecked) {
   EXPECT_EQ(ivis_client_set_policy(client.get(), IVIS_POLICY_STALL), IVIS_OK);
   EXPECT_EQ(ivis_client_set_policy(client.get(), static_cast<ivis_policy>(3)), IVIS_ERROR_ARGUMENT);
   EXPECT_EQ(ivis_client_set_policy(nullptr, IVIS_POLICY_STALL), IVIS_ERROR_ARGUMENT);
-  ivis_pace pace{1, 1, 0};
+  ivis_pace pace{1, 1, 0, 0};
   EXPECT_EQ(ivis_client_set_pace(client.get(), &pace), IVIS_OK);
   pace.vertical_m_s = HUGE_VAL;
   EXPECT_EQ(ivis_client_set_pace(client.get(), &pace), IVIS_ERROR_ARGUMENT);

@@ -233,6 +233,77 @@ TEST(RealTime, PredictedCellsLieAheadAndAreAnsweredForWhereTheyLie) {
   EXPECT_LT(glm::distance(centre, ahead) - glm::distance(centre, eye), 1);
 }
 
+// Round a curve of 20 m, 1.5 rad/s at this speed: nothing stalls, in cells half as large.
+TEST(RealTime, WhoTellsHowItTurnsGetsSmallerCellsAheadAndNothingStalls) {
+  const auto walk = [](double turning_rad_s, bool predict) {
+    auto run = std::make_unique<Observer>();
+    ivis_client::Options options = Observer::stalling();
+    options.pace.turning_rad_s = turning_rad_s;
+    options.predict = predict;
+    run->open({20ms, [](std::uint64_t) { return Duration{20ms}; }}, options);
+    run->walk(1500);
+    return run;
+  };
+  const auto ahead = walk(1.6, true);
+  EXPECT_EQ(ahead->missing, 0U);
+  EXPECT_EQ(ahead->client->stats().stalls, 0U);
+  const auto around = walk(0, false);
+  EXPECT_EQ(around->client->stats().stalls, 0U);
+  EXPECT_LT(ahead->reaches.back(), 0.65 * around->reaches.back());
+  // Who turns round on the spot is held, told why, and misses nothing.
+  ahead->walk(60, -kSpeed);
+  const ivis_stats stats = ahead->client->stats();
+  EXPECT_GT(stats.stalls, 0U);
+  EXPECT_EQ(stats.causes[IVIS_CAUSE_SPEED], stats.stalls);
+  EXPECT_EQ(ahead->missing, 0U);
+  ahead->walk(100, -kSpeed);
+  EXPECT_EQ(ahead->client->stats().stalls, stats.stalls) << "the other way now";
+}
+
+// What is no direction, or lies out of every cell, centres nothing.
+TEST(RealTime, CellsLieAheadOfWhoMovesAndHoldTheEye) {
+  Observer run({Reach::cylinder(1.5, 0.1)});
+  ivis_client::Options options = Observer::stalling();
+  options.pace = {30, 10, 1.0 / 60, 0.5};
+  options.predict = true;
+  run.open({0ms, [](std::uint64_t) { return Duration{1ms}; }}, options);
+  Vec3 eye{30, 1, 30};
+  const auto frames = [&](int n, const Vec3& step) {
+    ivis_frame f{};
+    for (int i = 0; i < n; ++i) {
+      f = run.frame(eye += step);
+      run.now += kFrame;
+    }
+    return f;
+  };
+  const auto ahead = [&](const ivis_frame& f) { return f.cell_eye[0] - f.eye[0]; };
+  // A frame old, 0.25 m ahead of where the eye was then: half the way at the speed told.
+  EXPECT_NEAR(ahead(frames(100, {0.4, 0, 0})), 0.25 - 0.4, 0.01);
+  frames(10, {0, 0, 0});
+  EXPECT_LT(std::abs(ahead(frames(10, {1e-4, 0, 0}))), 1e-3) << "noise";
+  eye.x -= 200;
+  EXPECT_LT(std::abs(ahead(frames(2, {0, 0, 0}))), 1e-3) << "a leap";
+  EXPECT_EQ(run.missing, 0U);
+}
+
+// Told that it may climb by 10 m/s, it climbs by 1.8: half the way at the speed told is out of
+// reach.
+TEST(RealTime, ACellThatLiesAheadHoldsTheEye) {
+  Observer run({Reach::cylinder(3, 0.3)});
+  ivis_client::Options options = Observer::stalling();
+  options.pace = {30, 10, 1.0 / 60, 0.5};
+  options.predict = true;
+  run.open({0ms, [](std::uint64_t) { return Duration{50ms}; }}, options);
+  Vec3 eye{30, 1, 30};
+  for (int i = 0; i < 300; ++i) {
+    run.frame(eye += Vec3{0, 0.03, 0});
+    run.now += kFrame;
+  }
+  EXPECT_GT(10 * run.client->stats().hold_ms / 2000, 0.4);
+  EXPECT_EQ(run.client->stats().stalls, 0U);
+  EXPECT_EQ(run.missing, 0U);
+}
+
 TEST(RealTime, LingeringObjectsStayForTheirFrames) {
   Observer run;
   ivis_client::Options options = Observer::stalling();

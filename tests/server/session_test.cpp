@@ -445,6 +445,26 @@ TEST_F(SessionsOnALadder, TheCellIsTheSmallestThatHoldsTheSpeedForTheTime) {
   EXPECT_EQ(reason(say({"nobody", 0, {}, {}}, wire::PaceMessage{1, {}})), Refusal::kSession);
 }
 
+TEST_F(SessionsOnALadder, ACellAheadOfWhoTurnsSlowlyIsSmallerAndLiesWhereItWasWished) {
+  wire::Hello hello;
+  hello.pace = {10, 0, 0.02, 0.5};
+  Peer a = greet_with(hello, {"disc:0.5", "disc:1", "disc:2"});
+  EXPECT_EQ(answered(a, 1, 90'000).rung, 1) << "0.9 m, all around";
+  wire::PoseMessage pose{a.session, 2, 0, {11, 1, 11}, 90'000};
+  pose.observer = Vec3(10.55, 1, 11);
+  EXPECT_FALSE(say(a, pose));
+  const wire::PvsMessage m = next_pvs(a);
+  EXPECT_EQ(m.rung, 0);
+  EXPECT_EQ(m.safe, wire::PvsMessage::kAllSafe);
+  EXPECT_FALSE(m.eye);
+  EXPECT_EQ(ids(a, m), small.solve({{11, 1, 11}, Reach::disc(0.5)})->objects);
+  // It turns at once from now on.
+  EXPECT_FALSE(say(a, wire::PaceMessage{a.session, {10, 0, 0.02}}));
+  pose.sequence = 3;
+  EXPECT_FALSE(say(a, pose));
+  EXPECT_EQ(next_pvs(a).rung, 1);
+}
+
 TEST_F(SessionsOnALadder, AWishForAStrategyReachesTheMethodAsWork) {
   struct Recording : NearMethod {
     using NearMethod::NearMethod;

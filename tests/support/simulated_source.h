@@ -77,7 +77,8 @@ class SimulatedSource : public client::PvsSource {
   }
 
   client::Answer solve(const client::Request& request) const {
-    const auto choice = ladder_.choose(pace_, request.hold_us);
+    const auto choice = ladder_.choose(server::Outlook(
+        pace_, request.hold_us, request.observer.value_or(request.centre) - request.centre));
     client::Answer a;
     a.sequence = request.sequence;
     a.cell = {request.centre, ladder_.reaches()[choice.rung]};

@@ -92,7 +92,8 @@ TEST(ToolWalk, InRealTimeWhatWasDrawnMissesNothingAndReplaysTheSame) {
          {std::vector<std::string>{},
           {"--strategy", "abort", "--budget-ms", "0.02"},
           {"--strategy", "predictive", "--budget-ms", "0.02"},
-          {"--policy", "show-all", "--predict", "--speed-limit", "3"}}) {
+          {"--policy", "show-all", "--predict", "--speed-limit", "3"},
+          {"--turning", "90"}}) {
       std::vector<std::string> words{"walk", "--connect", address, "--path",   town.path, "--fps",
                                      "60",   "--seconds", "1.5",   "--record", record,    "--json"};
       words.insert(words.end(), wish.begin(), wish.end());

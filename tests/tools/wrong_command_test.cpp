@@ -112,6 +112,8 @@ TEST(ToolRefuses, UsageErrorsWithCodeTwo) {
   expect_refused(with({"--fps", "0"}), 2, "--fps");
   expect_refused(with({"--seconds", "5"}), 2, "--fps");
   expect_refused(with({"--fps", "60", "--speed-limit", "nan"}), 2, "--speed-limit");
+  expect_refused(with({"--fps", "60", "--turning", "-1"}), 2, "--turning");
+  expect_refused(with({"--turning", "10"}), 2, "--fps");
   expect_refused(with({"--strategy", "hope"}), 2, "hope");
   expect_refused(with({"--budget-ms", "0"}), 2, "--budget-ms");
   expect_refused({"replay", t.path}, 2, "--connect");

@@ -40,6 +40,10 @@ TEST(WireEnvelope, MustHoldPayloadAndCentreOnlyWithAPvs) {
             "message: a payload, centre or changes without a pvs");
   EXPECT_EQ(error_of(b, fb::CreateEnvelope(b, nullptr, 0, &centre, &kPose)),
             "message: a payload, centre or changes without a pvs");
+  FlatBufferBuilder d;
+  EXPECT_EQ(error_of(d, fb::CreateEnvelope(d, &kPvs, 0, nullptr, nullptr, 0, 0, 0, nullptr, nullptr,
+                                           0, 0, nullptr, 0, &centre)),
+            "message: an observer without a pose");
   const auto in_c = c.CreateVector(payload);
   EXPECT_EQ(error_of(c, fb::CreateEnvelope(c, &kPvs, in_c, &centre)), "no error");
 }
@@ -88,14 +92,15 @@ TEST(WireEnvelope, MustNameOneToThirtyTwoReaches) {
 
 TEST(WireEnvelope, MustTellSpeedsThatAreSpeeds) {
   for (const double bad : {-1.0, 1e7, std::nan(""), HUGE_VAL}) {
-    for (const fb::Speeds& speeds :
-         {fb::Speeds(bad, 0, 0), fb::Speeds(0, bad, 0), fb::Speeds(0, 0, bad)}) {
+    for (int which = 0; which < 4; ++which) {
+      const auto at = [&](int i) { return i == which ? bad : 0.0; };
+      const fb::Speeds speeds(at(0), at(1), at(2));
       FlatBufferBuilder a, b;
-      const auto hello = fb::CreateHello(a, 2, true, 0, 0, &speeds);
+      const auto hello = fb::CreateHello(a, 2, true, 0, 0, &speeds, 0, 0, at(3));
       EXPECT_NE(
           error_of(a, fb::CreateEnvelope(a, nullptr, 0, nullptr, nullptr, hello)).find("speeds"),
           std::string::npos);
-      const fb::Pace pace(1, speeds);
+      const fb::Pace pace(1, speeds, at(3));
       EXPECT_NE(
           error_of(b, fb::CreateEnvelope(b, nullptr, 0, nullptr, nullptr, 0, 0, 0, nullptr, &pace))
               .find("speeds"),

@@ -56,6 +56,8 @@ std::vector<Message> samples() {
           Refused{12, Refusal::kScene, "another scene"},
           Refused{},
           PoseMessage{1, 2, 3, {4, 5, -6}, 16667, 5},
+          PoseMessage{1, 2, 3, {4, 5, -6}, 16667, 5, Vec3(3, 5, -6)},
+          PaceMessage{7, {1, 0, 0, 0.5}},
           EditMessage{7, 1, {{EditKind::kRemove, 4, {}, 0}}},
           EditMessage{7,
                       2,
@@ -162,14 +164,39 @@ TEST(WireDecoder, RejectsMoreThanItsLimit) {
   EXPECT_NE(error_of(bytes).find("at most 67108864"), std::string::npos);
 }
 
+// So that the server can say which version it speaks.
+TEST(WireDecoder, ReadsTheHelloOfAnEarlierVersion) {
+  Bytes bytes;
+  for (const int b :
+       {0x6c, 0x00, 0x00, 0x00, 0x18, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+        0x0e, 0x00, 0x0a, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x04, 0x00,
+        0x0e, 0x00, 0x00, 0x00, 0x14, 0x00, 0x00, 0x00, 0x00, 0x00, 0x0e, 0x00, 0x30, 0x00,
+        0x06, 0x00, 0x05, 0x00, 0x24, 0x00, 0x08, 0x00, 0x0c, 0x00, 0x0e, 0x00, 0x00, 0x00,
+        0x00, 0x01, 0x03, 0x00, 0x28, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+        0x3e, 0x40, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0xf0, 0x3f, 0x00, 0x00, 0x00, 0x00,
+        0x00, 0x00, 0x90, 0x3f, 0x08, 0x07, 0x06, 0x05, 0x04, 0x03, 0x02, 0x01, 0x00, 0x00,
+        0x00, 0x00, 0x06, 0x00, 0x00, 0x00, 0x64, 0x69, 0x73, 0x63, 0x3a, 0x31, 0x00, 0x00})
+    bytes.push_back(static_cast<std::byte>(b));
+  const auto m = decode(bytes);
+  ASSERT_TRUE(m) << m.error().message;
+  const auto& hello = std::get<Hello>(*m);
+  EXPECT_EQ(hello.version, 3);
+  EXPECT_EQ(hello.scene_hash, 0x0102030405060708U);
+  EXPECT_EQ(hello.pace, (Pace{30, 1, 0.015625}));
+}
+
 TEST(WireDecoder, RejectsNumbersThatAreNotFinite) {
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
         -std::numeric_limits<double>::infinity()}) {
     const double x = 1234.5;
     EXPECT_NE(error_of(patched(encode(PoseMessage{1, 2, 3, {0, x, 0}}), x, bad))
-                  .find("pose 2: eye is not finite"),
+                  .find("pose 2: eye or observer is not finite"),
               std::string::npos);
+    EXPECT_NE(
+        error_of(patched(encode(PoseMessage{1, 2, 3, {0, 1, 0}, 0, 0, Vec3(0, x, 0)}), x, bad))
+            .find("pose 2: eye or observer is not finite"),
+        std::string::npos);
     PvsMessage m = pvs_of(3);
     m.eye = Vec3(0, 0, x);
     EXPECT_NE(error_of(patched(encode(m), x, bad)).find("pvs 7: centre is not finite"),

@@ -64,15 +64,16 @@ std::map<std::string, Message> example(Bytes& full, Bytes& difference) {
   full = encode_pvs(set_of({3, 4, 5, 6, 40, 69}), PvsState(70), one);
   difference = encode_pvs(set_of({4, 5, 6, 7, 40, 69}), one, two);
   std::map<std::string, Message> m;
-  m["hello"] = Hello{3, 0x0102030405060708U, "disc:1", true, {30, 1, 0.015625}, {}, 0};
+  m["hello"] = Hello{4, 0x0102030405060708U, "disc:1", true, {30, 1, 0.015625, 0.5}, {}, 0};
   m["welcome"] =
-      Welcome{3, kSession, 0x0102030405060708U, 42, 70, {"disc:0.5", "disc:1"}, "cull_map", {}};
+      Welcome{4, kSession, 0x0102030405060708U, 42, 70, {"disc:0.5", "disc:1"}, "cull_map", {}};
   m["pose"] = PoseMessage{kSession, 1, 0, {1.5, 1.7, -2}, 16667, 0};
+  m["pose_ahead"] = PoseMessage{kSession, 2, 1, {1.5, 1.7, -3}, 16667, 0, Vec3(1.5, 1.7, -2)};
   m["pvs_full"] = PvsMessage{kSession, 1, 0, {}, false, 85, 1, 65535, full, {}};
   m["pvs_difference"] =
       PvsMessage{kSession, 2, 1, Vec3(1, 2, 3), false, 90, 0, 32767, difference, {}};
   m["pvs_everything"] = PvsMessage{kSession, 3, 0, {}, true, 4, 1, 65535, {}, {}};
-  m["pace"] = PaceMessage{kSession, {60, 2, 0.015625}};
+  m["pace"] = PaceMessage{kSession, {60, 2, 0.015625, 0.25}};
   m["refused"] = Refused{kSession, Refusal::kClosing, "bye"};
   m["bye"] = Bye{kSession};
   const Placement turned{{10, 0.5, -3}, {0.70710677F, 0, 0.70710677F, 0}};

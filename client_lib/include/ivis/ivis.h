@@ -60,6 +60,9 @@ typedef struct ivis_pace {
   double vertical_m_s;
   double frame_s; /* between frames; 0: not told. A server with too much to do goes by it: while a
                      PVS holds longer it may wait for your next, fresher pose */
+  double turning_rad_s; /* by which its direction of travel turns at most, as a vehicle's; 0: it may
+                           turn at once. With ivis_client_options.predict and frame_s cells are the
+                           smaller for it: they need not reach back to where it cannot go */
 } ivis_pace;
 
 /* What a client does when the eye is outside the cell of the PVS it has. */
@@ -117,7 +120,7 @@ typedef enum ivis_cause {
   IVIS_CAUSE_NONE = 0,         /* it is not */
   IVIS_CAUSE_NO_ANSWER = 1,    /* there has been no PVS yet */
   IVIS_CAUSE_DISCONNECTED = 2, /* the server is not there */
-  IVIS_CAUSE_SPEED = 3,        /* the eye moved faster than the pace told */
+  IVIS_CAUSE_SPEED = 3,        /* the eye moved or turned faster than the pace told */
   IVIS_CAUSE_LADDER = 4,       /* the server has no cell as large as the pace needs */
   IVIS_CAUSE_LATE = 5,         /* the next PVS is later than those before it were */
   IVIS_CAUSE_OTHER = 6,  /* no pace was told, nothing is measured yet, or a cell was centred by
