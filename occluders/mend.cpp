@@ -1,6 +1,7 @@
 #include "occluders/mend.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "occluders/fuse.h"
@@ -12,6 +13,11 @@ namespace {
 
 bool same(const Prism& a, const Prism& b) {
   return a.bottom == b.bottom && a.top == b.top && a.footprint.rings == b.footprint.rings;
+}
+
+void make_unique(std::vector<std::uint32_t>& indices) {
+  std::ranges::sort(indices);
+  indices.erase(std::unique(indices.begin(), indices.end()), indices.end());
 }
 
 std::vector<Prism> shrink_solids(const std::vector<Prism>& solids, const OccluderSet& set,
@@ -31,23 +37,22 @@ std::vector<Prism> shrink_solids(const std::vector<Prism>& solids, const Occlude
 std::vector<Prism> mend(const OccluderIndex& index, std::span<const Displaced> displaced,
                         const Eroder& eroder, const Context& context) {
   const OccluderSet& set = index.occluders();
-  std::vector<Box2> blocks;  // of the prisms that are out of use, which all reach down
-  for (const Displaced& d : displaced)
-    for (const std::uint32_t i : index.touched(d.bounds))
-      blocks.push_back(ground_box(index.box(i)));
-  const RectTree tree(blocks);
-  const auto near_blocks = [&](const Aabb& box) {
-    return !tree.all(ground_box(box),
-                     [&](std::uint32_t b) { return !blocks[b].overlaps(ground_box(box)); });
-  };
   struct Near {
     Aabb box;
     std::uint32_t solid;
     bool missing;
   };
+  std::vector<std::uint32_t> blocks;  // that are out of use, which all reach down
+  for (const Displaced& d : displaced)
+    std::ranges::copy(index.touched(d.bounds), std::back_inserter(blocks));
+  make_unique(blocks);
+  std::vector<std::uint32_t> about;
+  for (const std::uint32_t b : blocks)
+    std::ranges::copy(index.solids_on(ground_box(index.box(b))), std::back_inserter(about));
+  make_unique(about);
   std::vector<Near> near;
-  for (std::uint32_t s = 0; s < set.solids.size(); ++s)
-    if (const Aabb box = set.solids[s].bounds(); near_blocks(box)) near.push_back({box, s, false});
+  for (const std::uint32_t s : about)
+    near.push_back({index.solid_box(s), s, false});
   for (const Displaced& d : displaced) {
     // Each by itself: one that is there twice does not stand for another that is not there.
     const bool all_known = std::ranges::all_of(d.solids, [&](const Prism& p) {

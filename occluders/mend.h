@@ -24,7 +24,7 @@ struct Displaced {
 ///
 /// Guarantee: as OccluderSet::shrunk, for the scene without the displaced objects.
 /// Errors:    none; what fails is left out, and all that remains when the context is stopped.
-/// Threads:   reentrant. Cost: as of shrinking the blocks.
+/// Threads:   reentrant. Cost: as of shrinking the blocks, whatever else the scene has.
 std::vector<Prism> mend(const OccluderIndex& index, std::span<const Displaced> displaced,
                         const Eroder& eroder, const Context& context = {});
 

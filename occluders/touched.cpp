@@ -22,6 +22,12 @@ OccluderIndex::OccluderIndex(const OccluderSet& set)
     flat.push_back(ground_box(boxes_.back()));
   }
   tree_ = RectTree(flat);
+  flat.clear();
+  for (const Prism& p : set.solids) {
+    solid_boxes_.push_back(p.bounds());
+    flat.push_back(ground_box(solid_boxes_.back()));
+  }
+  solids_ = RectTree(flat);
 }
 
 Aabb OccluderIndex::box_of(const Prism& prism) const {
@@ -39,6 +45,16 @@ std::vector<std::uint32_t> OccluderIndex::touched(const Aabb& matter) const {
   std::vector<std::uint32_t> out;
   tree_.all(ground_box(matter), [&](std::uint32_t i) {
     if (boxes_[i].overlaps(matter)) out.push_back(i);
+    return true;
+  });
+  std::ranges::sort(out);
+  return out;
+}
+
+std::vector<std::uint32_t> OccluderIndex::solids_on(const Box2& area) const {
+  std::vector<std::uint32_t> out;
+  solids_.all(area, [&](std::uint32_t i) {
+    if (ground_box(solid_boxes_[i]).overlaps(area)) out.push_back(i);
     return true;
   });
   std::ranges::sort(out);

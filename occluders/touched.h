@@ -26,12 +26,18 @@ class OccluderIndex {
   Aabb box_of(const Prism& prism) const;
   /// Indices into OccluderSet::shrunk, ascending; `matter` holds all of an object.
   std::vector<std::uint32_t> touched(const Aabb& matter) const;
+  /// Indices into OccluderSet::solids that may stand on the area, ascending.
+  std::vector<std::uint32_t> solids_on(const Box2& area) const;
+  /// Of a solid.
+  const Aabb& solid_box(std::uint32_t solid) const { return solid_boxes_[solid]; }
 
  private:
   const OccluderSet& set_;
   Vec3 reach_;
   RectTree tree_;
   std::vector<Aabb> boxes_;  ///< of P + W, down without end
+  RectTree solids_;
+  std::vector<Aabb> solid_boxes_;
 };
 
 /// Can the object be part of an occluder? Not one tagged `never`, nor one that moves by itself, nor

@@ -5,6 +5,7 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <functional>
 #include <iostream>
 #include <map>
 #include <optional>
@@ -230,7 +231,8 @@ Result<std::unique_ptr<Generation>> load(const Config& config, const WorldOption
   return made;
 }
 
-/// Loads the scene anew, beside the server, whenever a signal asks for it.
+/// Loads the scene anew, beside the server, whenever a signal asks for it, and frees the old one
+/// there: both take long.
 class Reloader {
  public:
   Reloader(const Config& config, const WorldOptions& wanted, Log& log)
@@ -250,12 +252,32 @@ class Reloader {
     }
     if (!reload_requested.exchange(false)) return nullptr;
     log_.info("reloading", {{"scene", config_.scene.string()}});
-    done_ = false;
-    thread_ = std::thread([this] { run(); });
+    if (!start([this] { run(); }))
+      log_.error("reload_failed", {{"reason", "no thread can be made"}});
     return nullptr;
   }
 
+  /// Follows a take() that gave something.
+  void free(std::unique_ptr<Generation> old) {
+    old_ = std::move(old);
+    if (!start([this] {
+          old_.reset();
+          done_ = true;
+        }))
+      old_.reset();
+  }
+
  private:
+  bool start(std::function<void()> body) {
+    done_ = false;
+    try {
+      thread_ = std::thread(std::move(body));
+    } catch (const std::exception&) {
+      return false;
+    }
+    return true;
+  }
+
   void run() {
     Context quiet;
     quiet.stop = &stop_requested;
@@ -275,6 +297,7 @@ class Reloader {
   const WorldOptions& wanted_;
   Log& log_;
   std::unique_ptr<Generation> loaded_;
+  std::unique_ptr<Generation> old_;
   std::atomic<bool> done_{false};
   std::thread thread_;
 };
@@ -313,17 +336,22 @@ int serve(const Config& config) {
   }
   log.info("listening", {{"address", (*server)->endpoint()}});
   const auto build = [&](Generation& g) {
-    g.builder = std::make_unique<Builder>(*g.world, *g.ladder, wanted, log);
+    try {
+      g.builder = std::make_unique<Builder>(*g.world, *g.ladder, wanted, log);
+    } catch (const std::exception& e) {  // no thread can be made: the largest rung serves
+      log.warn("ladder", {{"rungs", g.ladder->ready()}, {"reason", e.what()}});
+    }
   };
   build(*generation);
   Reloader reloader(config, wanted, log);
   (*server)->run(stop_requested, [&]() -> std::optional<Server::Served> {
-    before.reset();  // the server has let go of it
+    if (before) reloader.free(std::move(before));  // the server has let go of it
     auto next = reloader.take();
     if (!next) return std::nullopt;
+    build(*next);
+    log.info("reloaded", {{"objects", next->served.objects()}});
+    // Nothing may fail from here on: the server would go on with what is freed.
     before = std::exchange(generation, std::move(next));
-    build(*generation);
-    log.info("reloaded", {{"objects", generation->served.objects()}});
     return generation->view();
   });
   return kOk;
@@ -348,7 +376,10 @@ int main(int argc, char** argv) {
   action.sa_handler = request_stop;
   sigaction(SIGTERM, &action, nullptr);
   sigaction(SIGINT, &action, nullptr);
+  // Started with nohup a hangup means nothing; a reload would forget the edits.
+  struct sigaction inherited {};
+  sigaction(SIGHUP, nullptr, &inherited);
   action.sa_handler = request_reload;
-  sigaction(SIGHUP, &action, nullptr);
+  if (inherited.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
   return serve(configured->config);
 }

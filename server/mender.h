@@ -20,8 +20,11 @@ namespace ivis::server {
 /// Shrinks anew, in a thread of its own, what edits have put out of use: the blocks that an object
 /// was part of, without it, and the object where it is now. The latest order is the next; what came
 /// of an earlier one is of use still, but for what it rests on: that is up to who takes it.
+/// Displaced objects are put into groups that have no solid in common, so that each is mended by
+/// itself: what was mended stays while its group does.
 /// Guarantee: as shrink(), for the scene as ordered. Threads: one at a time. Ownership: borrows
 ///            the scene and occluders. The destructor waits for the stack being eroded.
+/// Cost:      of an order, the erosion of the groups that it changes.
 class Mender {
  public:
   struct Moved {
@@ -41,6 +44,7 @@ class Mender {
     };
     Order order;
     std::map<const OccluderIndex*, Rung> rungs;
+    std::size_t eroded = 0;  ///< groups and objects that were shrunk for it, over all rungs
   };
 
   explicit Mender(const Scene& scene);
@@ -53,8 +57,14 @@ class Mender {
   bool busy() const;
 
  private:
+  /// What was shrunk for the last order on one rung.
+  struct Kept {
+    std::map<std::vector<ObjectId>, std::vector<Prism>> groups;
+    std::map<ObjectId, std::pair<Placement, ShrunkObject>> objects;
+  };
+
   void run();
-  Mended mended(Order order) const;
+  Mended mended(Order order);
 
   const Scene& scene_;
   mutable std::mutex mutex_;
@@ -63,6 +73,7 @@ class Mender {
   bool working_ = false;
   std::optional<Order> order_;
   std::optional<Mended> done_;
+  std::map<const OccluderIndex*, Kept> kept_;  ///< of the thread
   std::thread thread_;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "occluders/rect_tree.h"
 #include "scenes/edited.h"
 #include "wire/messages.h"
 
@@ -66,14 +67,18 @@ std::string SceneState::why_not(const Edit& edit) const {
 }
 
 SceneState::Outcome SceneState::apply(std::span<const Edit> edits, Time now) {
+  if (torn_)
+    return {0, "an edit was torn by a lack of memory: the scene has to be loaded anew (SIGHUP)"};
   for (const Edit& e : edits)
     if (std::string why = why_not(e); !why.empty()) return {0, std::move(why)};
   ++epoch_;
+  torn_ = true;  // unless all of it is done
   for (const Edit& e : edits)
     apply_one(e, now);
   // What an object comes to in the end: a door that is switched to and fro costs as much as once.
   for (auto e = changed_.rbegin(); e != changed_.rend() && e->epoch == epoch_; ++e)
     update_displaced(e->state.id);
+  torn_ = false;
   return {epoch_, {}};
 }
 
@@ -81,8 +86,9 @@ void SceneState::apply_one(const Edit& edit, Time now) {
   const Object& o = object(edit.id);
   auto found = entry_.find(edit.id);
   if (found == entry_.end()) {
-    changed_.push_back({});
-    found = entry_.emplace(edit.id, std::prev(changed_.end())).first;
+    std::list<Entry> one(1);
+    found = entry_.emplace(edit.id, one.begin()).first;
+    changed_.splice(changed_.end(), one);
     Entry& fresh = changed_.back();
     fresh.state.id = edit.id;
     fresh.state.placement.position = Vec3(o.to_world[3]);
@@ -156,13 +162,13 @@ void SceneState::replace(Rung& rung, ObjectId id) {
 }
 
 SceneState::Rung& SceneState::rung_of(const OccluderIndex& index) {
-  const auto [found, fresh] = rungs_.try_emplace(&index);
-  if (fresh && !displaced_.empty()) {
-    for (const auto& [id, box] : displaced_)
-      displace(index, found->second, id);
-    mending_due_ = true;
-  }
-  return found->second;
+  if (const auto found = rungs_.find(&index); found != rungs_.end()) return found->second;
+  Rung rung;
+  for (const auto& [id, box] : displaced_)
+    displace(index, rung, id);
+  mending_due_ = mending_due_ || !displaced_.empty();
+  // Last: it is known only with all that is displaced, though memory runs out.
+  return rungs_.emplace(&index, std::move(rung)).first->second;
 }
 
 void SceneState::order_mending() {
@@ -197,11 +203,15 @@ std::shared_ptr<const Amendment> SceneState::amendment(const OccluderIndex& inde
                                                        Time until) {
   if (epoch_ == 0) return nullptr;
   Rung& rung = rung_of(index);
-  if (std::exchange(mending_due_, false)) order_mending();
+  if (mending_due_) order_mending();
+  mending_due_ = false;
   if (auto mended = mender_.take()) {
     mended_ = std::move(*mended);
     ++mendings_;
   }
+  // Where nothing moves by itself an answer's time is no matter.
+  if (rung.answer && rung.answer_epoch == epoch_ && rung.mendings == mendings_ && movers_ == 0)
+    return rung.answer;
   if (!gone_) {
     auto bits = std::make_shared<std::vector<std::uint64_t>>((scene_.objects.size() + 63) / 64);
     for (const Entry& e : changed_) {
@@ -217,8 +227,8 @@ std::shared_ptr<const Amendment> SceneState::amendment(const OccluderIndex& inde
       (!rung.current || rung.version != matter_version_ || rung.mendings != mendings_)) {
     rung.current = change_of(index, rung);
     rung.version = matter_version_;
-    rung.mendings = mendings_;
   }
+  rung.mendings = mendings_;
   auto out = std::make_shared<Amendment>();
   out->gone = gone_;
   if (!displaced_.empty()) out->occluders = rung.current;
@@ -239,6 +249,8 @@ std::shared_ptr<const Amendment> SceneState::amendment(const OccluderIndex& inde
     if (above || e.bounds.lo.y >= floor) box.lo.y = std::max(box.lo.y, floor);
     out->placed.push_back({s.id, box});
   }
+  rung.answer = out;
+  rung.answer_epoch = epoch_;
   return out;
 }
 
@@ -259,9 +271,14 @@ std::shared_ptr<const OccluderChange> SceneState::change_of(const OccluderIndex&
     if (!std::ranges::binary_search(mended_.order.displaced, id, {},
                                     [](const auto& d) { return d.first; }))
       missing.push_back(box);
+  std::vector<Box2> places;
+  for (const Aabb& b : missing)
+    places.push_back(ground_box(b));
+  const RectTree tree(places);
   for (const Prism& p : mended->second.blocks) {
     const Aabb rests_on = index.box_of(p);
-    if (std::ranges::none_of(missing, [&](const Aabb& b) { return b.overlaps(rests_on); }))
+    if (tree.all(ground_box(rests_on),
+                 [&](std::uint32_t i) { return !missing[i].overlaps(rests_on); }))
       change->added.push_back(p);
   }
   for (std::size_t k = 0; k < mended_.order.moved.size(); ++k) {

@@ -34,7 +34,7 @@ class SceneState {
  public:
   using Time = std::chrono::steady_clock::time_point;
   static constexpr double kMoverLagS = 0.1;
-  /// That a message can tell of.
+  /// Objects other than in the file: some 200 bytes each.
   static constexpr std::size_t kMostChanged = 100'000;
   /// Of one answer, but for the rest of an epoch: 64 bytes each.
   static constexpr std::size_t kMostTold = 4096;
@@ -45,7 +45,8 @@ class SceneState {
     std::uint32_t epoch = 0;  ///< 0: refused, and nothing was done
     std::string why;
   };
-  /// All or nothing. Cost: microseconds an edit, and a few more for each occluder touched.
+  /// All or nothing; where memory runs out in between, the scene is torn(). Cost: microseconds an
+  /// edit, and a few more for each occluder touched.
   Outcome apply(std::span<const Edit> edits, Time now);
 
   std::uint32_t epoch() const { return epoch_; }
@@ -57,11 +58,13 @@ class SceneState {
   /// What has changed since that epoch. Where that is very much it is a part: of the earliest
   /// epochs. Later epochs than epoch() count as 0.
   Told since(std::uint32_t epoch) const;
+  /// Is an edit half done? Then any object may be seen, and no more edits are taken.
+  bool torn() const { return torn_; }
   /// Is there anything that moves by itself?
   bool moves() const { return movers_ > 0; }
   /// For a PVS that is in use from `now` to `until`, by the occluders behind `index`; null: the
-  /// scene is as in the file. Cost: a copy a moved object; after an edit of matter also one of the
-  /// masks.
+  /// scene is as in the file. Cost: none while nothing changes and nothing moves by itself; else a
+  /// look at each object that was changed; after an edit of matter also a copy of the masks.
   std::shared_ptr<const Amendment> amendment(const OccluderIndex& index, Time now, Time until);
   /// Is something being shrunk anew, or waiting to be taken into use?
   bool mending() const { return mender_.busy(); }
@@ -81,6 +84,8 @@ class SceneState {
     std::shared_ptr<const OccluderChange> current;
     std::uint64_t version = 0;  ///< matter_version_ and mendings_ that `current` is of
     std::uint64_t mendings = 0;
+    std::shared_ptr<const Amendment> answer;  ///< the latest
+    std::uint32_t answer_epoch = 0;
   };
 
   std::uint32_t occluder_count() const;
@@ -105,6 +110,7 @@ class SceneState {
   std::map<ObjectId, Aabb> displaced_;  ///< matter that is not where the file has it
   std::uint64_t matter_version_ = 0;
   bool mending_due_ = false;  ///< ordered with the next answer: who does not ask needs none
+  bool torn_ = false;
   std::size_t movers_ = 0;
   std::map<const OccluderIndex*, Rung> rungs_;
   Mender::Mended mended_;       ///< the newest

@@ -219,9 +219,12 @@ Status probe_address(const std::string& listen) {
 void Server::run(const std::atomic<bool>& stop,
                  const std::function<std::optional<Served>()>& other) {
   Impl& s = *impl_;
+  std::optional<Served> next;
   while (!stop.load(std::memory_order_relaxed)) {
     try {
-      if (const auto served = other()) s.replace(*served);
+      if (!next) next = other();
+      if (next) s.replace(*next);  // until it is done: what is served now may be gone afterwards
+      next.reset();
       s.turn();
     } catch (const zmq::error_t& e) {
       if (e.num() == EINTR) continue;  // a signal: look at `stop`

@@ -466,7 +466,50 @@ TEST(SceneStateTest, ARungThatIsReadyLaterIsMendedToo) {
   EXPECT_FALSE(amended()->occluders->shrunk_off.empty()) << "masked at once";
   for (int i = 0; i < 20'000 && amended()->occluders->added.empty(); ++i)
     std::this_thread::sleep_for(1ms);
+  EXPECT_FALSE(amended()->occluders->added.empty());
   EXPECT_EQ(amended()->occluders->added.size(), e.amendment()->occluders->added.size());
+}
+
+// A row of three houses, fused into one block, and things behind it.
+TEST(SceneStateTest, WhatWasMendedIsLeftOutOnceMoreOfItIsMissing) {
+  SceneBuilder b;
+  std::vector<ObjectId> row;
+  for (int k = 0; k < 3; ++k)
+    row.push_back(b.add_box({20, 0, -30.0 + 20 * k}, {32, 12, -10.0 + 20 * k}));
+  for (int k = 0; k < 30; ++k)
+    b.add_box({40, 0, -29.0 + 2 * k}, {40.5, 1, -28.0 + 2 * k}, OccluderTag::kNever);
+  EditedScene e(std::move(b).finish());
+  const Vec3 eye{0, 1.7, 0};
+  e.edit(EditKind::kOccluderOff, row[0]);
+  e.wait_until_mended();
+  const auto mended = e.amendment();
+  ASSERT_FALSE(mended->occluders->added.empty()) << "the other two hide on";
+  const auto rests_on = [&](const Prism& p, ObjectId house) {
+    const Aabb& box = e.scene.objects[house].bounds;
+    return e.index.box_of(p).overlaps({box.lo + 0.5, box.hi - 0.5});  // not on a neighbour's wall
+  };
+  EXPECT_TRUE(std::ranges::any_of(mended->occluders->added,
+                                  [&](const Prism& p) { return rests_on(p, row[2]); }));
+  e.edit(EditKind::kOccluderOff, row[2]);
+  const auto after = e.amendment();
+  EXPECT_TRUE(std::ranges::none_of(after->occluders->added,
+                                   [&](const Prism& p) { return rests_on(p, row[2]); }));
+  EXPECT_EQ(e.misses(e.solve(eye, after.get()), e.states()), 0U);
+  e.wait_until_mended();
+  EXPECT_FALSE(e.amendment()->occluders->added.empty()) << "the middle one hides on";
+  EXPECT_EQ(e.misses(eye), 0U);
+}
+
+TEST(SceneStateTest, AnAnswerIsMadeOnceWhileNothingChanges) {
+  EditedScene e(random_town(3, false));
+  e.edit(EditKind::kOccluderOff, e.buildings[0]);
+  e.wait_until_mended();
+  const auto first = e.amendment();
+  EXPECT_EQ(e.amendment(1s), first);
+  e.edit(EditKind::kOccluderOn, e.buildings[0]);
+  EXPECT_NE(e.amendment(), first);
+  e.move_by(e.buildings[1], {1, 0, 0}, 0, 5);
+  EXPECT_NE(e.amendment(1s), e.amendment(1s)) << "it moves on";
 }
 
 TEST(SceneStateTest, AThingOnAWallShowsOnceTheWallIsGone) {

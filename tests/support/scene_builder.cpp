@@ -91,6 +91,13 @@ ObjectId SceneBuilder::add_box(const Vec3& lo, const Vec3& hi, OccluderTag tag, 
   return id;
 }
 
+ObjectId SceneBuilder::add_sheet(const Vec3& lo, const Vec3& hi) {
+  Mesh mesh;
+  mesh.positions = {lo, {hi.x, lo.y, hi.z}, hi, {lo.x, hi.y, lo.z}};
+  add_quad(mesh, 0, 1, 2, 3);
+  close(mesh);
+  return add_mesh(std::move(mesh));
+}
 ObjectId SceneBuilder::add_ground(const Vec2& lo, const Vec2& hi, double y) {
   Mesh mesh;
   mesh.positions = {{lo.x, y, lo.y}, {lo.x, y, hi.y}, {hi.x, y, hi.y}, {hi.x, y, lo.y}};

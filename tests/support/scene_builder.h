@@ -18,6 +18,8 @@ class SceneBuilder {
   ObjectId add_prism(const std::vector<Vec2>& ring, double bottom, double top,
                      OccluderTag tag = OccluderTag::kAuto);
   /// A horizontal rectangle at y, two triangles.
+  /// An upright rectangle between two corners, without a solid.
+  ObjectId add_sheet(const Vec3& lo, const Vec3& hi);
   ObjectId add_ground(const Vec2& lo, const Vec2& hi, double y);
   ObjectId add_mesh(Mesh mesh, OccluderTag tag = OccluderTag::kAuto,
                     const Mat4& to_world = Mat4{1});
