@@ -53,9 +53,12 @@ class RectTree {
     first_[leaves_] = items_.size();
     std::iota(items_.begin(), items_.end(), 0U);
     build(boxes, 1, 0, items_.size());
+    boxes_.reserve(items_.size());
+    for (const std::uint32_t i : items_)
+      boxes_.push_back(boxes[i]);
   }
 
-  /// Does `accept(item)` hold for every item whose box may overlap `box`? Stops at the first for
+  /// Does `accept(item)` hold for every item whose box overlaps `box`? Stops at the first for
   /// which it does not.
   template <class F>
   bool all(const Box2& box, const F& accept) const {
@@ -91,11 +94,12 @@ class RectTree {
     if (!nodes_[node].overlaps(box)) return true;
     if (node < leaves_) return all(2 * node, box, accept) && all(2 * node + 1, box, accept);
     for (std::size_t i = first_[node - leaves_]; i < first_[node - leaves_ + 1]; ++i)
-      if (!accept(items_[i])) return false;
+      if (boxes_[i].overlaps(box) && !accept(items_[i])) return false;
     return true;
   }
 
   std::vector<std::uint32_t> items_;  // in leaf order
+  std::vector<Box2> boxes_;           // of the items, likewise
   std::vector<Box2> nodes_;           // children of node i: 2i, 2i + 1; root 1
   std::vector<std::size_t> first_;    // of each leaf's run in items_
   std::size_t leaves_ = 1;

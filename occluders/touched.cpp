@@ -43,6 +43,7 @@ Aabb OccluderIndex::box_of(const Prism& prism) const {
 
 std::vector<std::uint32_t> OccluderIndex::touched(const Aabb& matter) const {
   std::vector<std::uint32_t> out;
+  out.reserve(32);
   tree_.all(ground_box(matter), [&](std::uint32_t i) {
     if (boxes_[i].overlaps(matter)) out.push_back(i);
     return true;
@@ -54,7 +55,7 @@ std::vector<std::uint32_t> OccluderIndex::touched(const Aabb& matter) const {
 std::vector<std::uint32_t> OccluderIndex::solids_on(const Box2& area) const {
   std::vector<std::uint32_t> out;
   solids_.all(area, [&](std::uint32_t i) {
-    if (ground_box(solid_boxes_[i]).overlaps(area)) out.push_back(i);
+    out.push_back(i);
     return true;
   });
   std::ranges::sort(out);

@@ -302,8 +302,9 @@ class Reloader {
   std::thread thread_;
 };
 
-int serve(const Config& config) {
+int serve(const Config& config, bool hangups_ignored) {
   Log log(config.log_level, config.json_logs);
+  if (hangups_ignored) log.info("reload", {{"reason", "started with SIGHUP ignored (nohup)"}});
   // Asked before the loading, which can take long, and again by the bind below.
   if (auto free = probe_address(config.listen); !free) {
     report(free.error());
@@ -380,6 +381,7 @@ int main(int argc, char** argv) {
   struct sigaction inherited {};
   sigaction(SIGHUP, nullptr, &inherited);
   action.sa_handler = request_reload;
-  if (inherited.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
-  return serve(configured->config);
+  const bool hangups_ignored = inherited.sa_handler == SIG_IGN;
+  if (!hangups_ignored) sigaction(SIGHUP, &action, nullptr);
+  return serve(configured->config, hangups_ignored);
 }

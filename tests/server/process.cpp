@@ -34,6 +34,7 @@ Process::Process(const std::vector<std::string>& command,
   if (pid_ == 0) {
     dup2(pipe_ends[1], STDOUT_FILENO);
     dup2(pipe_ends[1], STDERR_FILENO);
+    ::signal(SIGHUP, SIG_DFL);  // whatever the tests were started by
     for (const std::string& variable : environment)
       putenv(const_cast<char*>(variable.c_str()));
     execv(argv[0], argv.data());

@@ -128,5 +128,18 @@ TEST_F(ToolEdit, ASceneLoadedAnewForgetsEditsAndOneThatCannotBeReadIsNotTakenUp)
   EXPECT_EQ(daemon.finish(), 0) << daemon.output();
 }
 
+TEST_F(ToolEdit, UnderNohupAHangupForgetsNothing) {
+  Process daemon({"/bin/sh", "-c", "trap '' HUP; exec \"$@\"", "sh", IVIS_DAEMON, "--scene",
+                  town.scene, "--listen", address});
+  ASSERT_TRUE(daemon.says("listening")) << daemon.output();
+  EXPECT_THAT(daemon.output(), HasSubstr("started with SIGHUP ignored"));
+  EXPECT_EQ(edit({"remove", "1"}).code, 0);
+  daemon.signal(SIGHUP);
+  EXPECT_THAT(edit({"remove", "2"}).out, HasSubstr("epoch 2"));
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.finish(), 0) << daemon.output();
+  EXPECT_EQ(daemon.output().find("event=reloading"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace ivis::test
