@@ -17,7 +17,7 @@ Result<Pvs> solve(const Job& job, Work& done) {
   try {
     if (job.everything) {
       Pvs pvs;
-      pvs.everything_because = "the client is far behind";
+      pvs.everything_because = "the client is far behind, or an edit half done";
       return pvs;
     }
     if (job.amendment) return job.method->solve(job.cell, job.effort, *job.amendment, done);

@@ -52,7 +52,8 @@ constexpr const char* kMore =
     "  ivisd --scene city.glb --occluders city.ivo --listen tcp://127.0.0.1:7447 &\n"
     "  ivis walk --connect tcp://127.0.0.1:7447 --path walk.csv\n"
     "  kill %1        (bids its clients farewell and exits 0)\n"
-    "  kill -HUP %1   (loads the scene anew and goes on with its clients; edits are forgotten)\n"
+    "  kill -HUP %1   (loads the scene anew and goes on with its clients; edits are forgotten;\n"
+    "                   not when it was started by nohup)\n"
     "\n"
     "Every option may also be a key of the --config file (log_level = \"debug\") or a variable of "
     "the\n"
@@ -252,8 +253,10 @@ class Reloader {
     }
     if (!reload_requested.exchange(false)) return nullptr;
     log_.info("reloading", {{"scene", config_.scene.string()}});
-    if (!start([this] { run(); }))
+    if (!start([this] { run(); })) {
+      reload_requested = true;  // once more, later
       log_.error("reload_failed", {{"reason", "no thread can be made"}});
+    }
     return nullptr;
   }
 
@@ -304,7 +307,8 @@ class Reloader {
 
 int serve(const Config& config, bool hangups_ignored) {
   Log log(config.log_level, config.json_logs);
-  if (hangups_ignored) log.info("reload", {{"reason", "started with SIGHUP ignored (nohup)"}});
+  if (hangups_ignored)
+    log.warn("no_reload", {{"reason", "started with SIGHUP ignored, as by nohup"}});
   // Asked before the loading, which can take long, and again by the bind below.
   if (auto free = probe_address(config.listen); !free) {
     report(free.error());

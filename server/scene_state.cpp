@@ -67,8 +67,7 @@ std::string SceneState::why_not(const Edit& edit) const {
 }
 
 SceneState::Outcome SceneState::apply(std::span<const Edit> edits, Time now) {
-  if (torn_)
-    return {0, "an edit was torn by a lack of memory: the scene has to be loaded anew (SIGHUP)"};
+  if (torn_) return {0, kTorn};
   for (const Edit& e : edits)
     if (std::string why = why_not(e); !why.empty()) return {0, std::move(why)};
   ++epoch_;
@@ -210,7 +209,8 @@ std::shared_ptr<const Amendment> SceneState::amendment(const OccluderIndex& inde
     ++mendings_;
   }
   // Where nothing moves by itself an answer's time is no matter.
-  if (rung.answer && rung.answer_epoch == epoch_ && rung.mendings == mendings_ && movers_ == 0)
+  if (rung.answer && rung.answer_epoch == epoch_ && rung.answer_mendings == mendings_ &&
+      movers_ == 0)
     return rung.answer;
   if (!gone_) {
     auto bits = std::make_shared<std::vector<std::uint64_t>>((scene_.objects.size() + 63) / 64);
@@ -227,8 +227,8 @@ std::shared_ptr<const Amendment> SceneState::amendment(const OccluderIndex& inde
       (!rung.current || rung.version != matter_version_ || rung.mendings != mendings_)) {
     rung.current = change_of(index, rung);
     rung.version = matter_version_;
+    rung.mendings = mendings_;
   }
-  rung.mendings = mendings_;
   auto out = std::make_shared<Amendment>();
   out->gone = gone_;
   if (!displaced_.empty()) out->occluders = rung.current;
@@ -251,6 +251,7 @@ std::shared_ptr<const Amendment> SceneState::amendment(const OccluderIndex& inde
   }
   rung.answer = out;
   rung.answer_epoch = epoch_;
+  rung.answer_mendings = mendings_;
   return out;
 }
 

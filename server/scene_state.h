@@ -39,6 +39,10 @@ class SceneState {
   /// Of one answer, but for the rest of an epoch: 64 bytes each.
   static constexpr std::size_t kMostTold = 4096;
 
+  static constexpr const char* kTorn =
+      "an edit was torn by a lack of memory: the scene has to be loaded anew (SIGHUP, or a "
+      "restart)";
+
   explicit SceneState(const Scene& scene);
 
   struct Outcome {
@@ -85,7 +89,8 @@ class SceneState {
     std::uint64_t version = 0;  ///< matter_version_ and mendings_ that `current` is of
     std::uint64_t mendings = 0;
     std::shared_ptr<const Amendment> answer;  ///< the latest
-    std::uint32_t answer_epoch = 0;
+    std::uint32_t answer_epoch = 0;           ///< that it is of, and
+    std::uint64_t answer_mendings = 0;        ///< likewise
   };
 
   std::uint32_t occluder_count() const;

@@ -156,6 +156,10 @@ struct Server::Impl {
     const auto now = std::chrono::steady_clock::now();
     for (const Outgoing& notice : sessions.notices(now))
       send(notice);
+    if (sessions.scene_torn() != torn) {
+      torn = !torn;
+      if (torn) log.error("scene_torn", {{"reason", SceneState::kTorn}});
+    }
     if (now >= next_housekeeping) {
       next_housekeeping = now + kHousekeeping;
       if (const auto gone = sessions.expire(now); gone != 0)
@@ -169,6 +173,7 @@ struct Server::Impl {
   Workers workers;
   std::string endpoint;
   bool held = false;  ///< the address is ours
+  bool torn = false;  ///< was said
   std::uint64_t dropped = 0;
   SessionTable::Time next_housekeeping{};
   zmq::context_t context;

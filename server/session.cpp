@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <utility>
 
 #include "core/view_cell.h"
@@ -172,13 +173,21 @@ std::optional<Outgoing> SessionTable::handle(std::string_view peer, const wire::
            !ladder_->largest_method().takes_amendments())
     outcome.why = "the method " + ladder_->largest_method().traits().name + " takes no edits";
   else
-    outcome = state_->apply(edit.edits, now);
+    outcome = apply(edit, now);
   if (outcome.epoch != 0)
     counters_.edits += edit.edits.size();
   else
     ++counters_.edits_refused;
   return Outgoing{std::string(peer), wire::encode(wire::EditedMessage{edit.session, edit.request,
                                                                       outcome.epoch, outcome.why})};
+}
+
+SceneState::Outcome SessionTable::apply(const wire::EditMessage& edit, Time now) {
+  try {
+    return state_->apply(edit.edits, now);
+  } catch (const std::bad_alloc&) {
+    return {0, state_->torn() ? SceneState::kTorn : "the server is out of memory"};
+  }
 }
 
 std::vector<Outgoing> SessionTable::notices(Time now) {
@@ -312,8 +321,6 @@ Ladder::Choice SessionTable::choose(const Session& session, const wire::PoseMess
 Job SessionTable::answer(Peers::value_type& peer, Time now) {
   Session& session = peer.second;
   const wire::PoseMessage pose = *session.pose;
-  session.pose.reset();
-  session.under_way = true;
   // The first frame that needs another PVS.
   session.due = session.posed + frame_of(session.pace) +
                 std::max<Time::duration>(kLeastHold, std::chrono::microseconds(pose.hold_us));
@@ -348,6 +355,9 @@ Job SessionTable::answer(Peers::value_type& peer, Time now) {
     job.message.base = pose.have_pvs;
     job.base = session.sent.front().state;
   }
+  // Last: where memory runs out before it, the next pose asks again.
+  session.pose.reset();
+  session.under_way = true;
   return job;
 }
 

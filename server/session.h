@@ -108,6 +108,8 @@ class SessionTable {
   /// A farewell to every client; no session is left.
   std::vector<Outgoing> close();
 
+  /// Is everything listed, as an edit is half done? (SceneState::torn())
+  bool scene_torn() const { return state_ != nullptr && state_->torn(); }
   std::size_t size() const { return sessions_.size(); }
   const SessionCounters& counters() const { return counters_; }
 
@@ -144,6 +146,7 @@ class SessionTable {
   std::optional<Outgoing> handle(std::string_view peer, const wire::PaceMessage& pace, Time now);
   std::optional<Outgoing> handle(std::string_view peer, const wire::EditMessage& edit, Time now);
   std::optional<Outgoing> handle(std::string_view peer, const wire::Bye& bye);
+  SceneState::Outcome apply(const wire::EditMessage& edit, Time now);
   std::vector<Outgoing> end_all(wire::Refusal reason, const std::string& text);
   /// The peer's session if it is the one named, else null.
   Session* find(std::string_view peer, std::uint64_t id);

@@ -37,11 +37,11 @@ void Workers::end() {
 }
 
 void Workers::give(Job job) {
-  ++under_way_;
   {
     const std::lock_guard lock(mutex_);
     jobs_.push_back(std::move(job));
   }
+  ++under_way_;  // of which memory was there for
   given_.notify_one();
 }
 

@@ -3,15 +3,21 @@
 #include <algorithm>
 #include <memory>
 #include <new>
+#include <optional>
+#include <variant>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "occluders/fast_erosion.h"
 #include "occluders/shrink.h"
+#include "server/ladder.h"
 #include "server/scene_state.h"
+#include "server/session.h"
 #include "tests/server/failing_new.h"
 #include "tests/support/scene_builder.h"
+#include "visibility/method.h"
+#include "wire/messages.h"
 
 namespace ivis::test {
 namespace {
@@ -100,6 +106,53 @@ TEST(SceneStateMemory, ARungIsMaskedWhollyOrNotYetThere) {
     EXPECT_EQ(std::ranges::count(amendment->occluders->shrunk_off, 0), 0) << most;
   }
   EXPECT_GT(thrown, 5);
+}
+
+// Past a session: whose edit tears the scene is told so, and everything is listed from then on.
+TEST(SceneStateMemory, ATornSceneListsEverything) {
+  SceneBuilder b;
+  const ObjectId house = b.add_box({20, 0, -30}, {32, 12, 30});
+  b.add_box({60, 0, -1}, {61, 1, 1}, OccluderTag::kNever);
+  const Scene scene = std::move(b).finish();
+  ShrinkOptions options;
+  options.reach = Reach::disc(1);
+  const auto shrunk = shrink(scene, options, FastEroder{});
+  ASSERT_TRUE(shrunk);
+  const OccluderIndex index(shrunk->set);
+  const auto method = make_method("cull-map", scene, shrunk->set, {});
+  ASSERT_TRUE(method);
+  const server::ServedScene served = server::served_scene(scene);
+  const server::Ladder ladder(options.reach, **method, shrunk->set.slack_m, &index);
+  bool torn = false;
+  for (int most = 0; !torn; ++most) {
+    ASSERT_LT(most, 1000);
+    SceneState state(scene);
+    server::SessionTable table(served, ladder, {}, {}, &state);
+    const auto say = [&](const wire::Message& m) {
+      return table.receive("a", std::visit([](const auto& x) { return wire::encode(x); }, m), {});
+    };
+    EXPECT_FALSE(say(wire::Hello{}));
+    const auto welcomed = wire::decode(table.work({})->bytes);
+    const std::uint64_t session = std::get<wire::Welcome>(*welcomed).session;
+    std::uint32_t sequence = 0;
+    const auto asked = [&] {
+      EXPECT_FALSE(say(wire::PoseMessage{session, ++sequence, 0, {0, 1.7, 0}}));
+      return std::get<wire::PvsMessage>(*wire::decode(table.work({})->bytes));
+    };
+    EXPECT_FALSE(asked().everything);
+    const auto edit = wire::encode(
+        wire::EditMessage{session, 1, {{EditKind::kMove, house, {{1, 0, 0}, {1, 0, 0, 0}}, 0}}});
+    std::optional<server::Outgoing> out;
+    allocations_left = most;
+    try {
+      out = table.receive("a", edit, {});
+    } catch (const std::bad_alloc&) {
+    }
+    allocations_left = -1;
+    torn = table.scene_torn();
+    EXPECT_EQ(asked().everything, torn);
+    EXPECT_EQ(state.apply({}, {}).epoch == 0, torn);
+  }
 }
 
 }  // namespace

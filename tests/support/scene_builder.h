@@ -17,9 +17,9 @@ class SceneBuilder {
   /// closed, outward winding.
   ObjectId add_prism(const std::vector<Vec2>& ring, double bottom, double top,
                      OccluderTag tag = OccluderTag::kAuto);
-  /// A horizontal rectangle at y, two triangles.
   /// An upright rectangle between two corners, without a solid.
   ObjectId add_sheet(const Vec3& lo, const Vec3& hi);
+  /// A horizontal rectangle at y, two triangles.
   ObjectId add_ground(const Vec2& lo, const Vec2& hi, double y);
   ObjectId add_mesh(Mesh mesh, OccluderTag tag = OccluderTag::kAuto,
                     const Mat4& to_world = Mat4{1});

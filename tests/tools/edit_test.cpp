@@ -132,7 +132,7 @@ TEST_F(ToolEdit, UnderNohupAHangupForgetsNothing) {
   Process daemon({"/bin/sh", "-c", "trap '' HUP; exec \"$@\"", "sh", IVIS_DAEMON, "--scene",
                   town.scene, "--listen", address});
   ASSERT_TRUE(daemon.says("listening")) << daemon.output();
-  EXPECT_THAT(daemon.output(), HasSubstr("started with SIGHUP ignored"));
+  EXPECT_THAT(daemon.output(), HasSubstr("event=no_reload"));
   EXPECT_EQ(edit({"remove", "1"}).code, 0);
   daemon.signal(SIGHUP);
   EXPECT_THAT(edit({"remove", "2"}).out, HasSubstr("epoch 2"));

@@ -61,7 +61,8 @@ typedef struct ivis_pace {
   double frame_s; /* between frames; 0: not told. A server with too much to do goes by it: while a
                      PVS holds longer it may wait for your next, fresher pose */
   double turning_rad_s; /* by which its direction of travel turns at most, as a vehicle's; 0: it may
-                           turn at once. With ivis_client_options.predict and frame_s cells are the
+                           turn at once; at most 1e6. With ivis_client_options.predict and frame_s, and
+                           while it turns by less than 1 before the next PVS, cells are the
                            smaller for it: they need not reach back to where it cannot go */
 } ivis_pace;
 
