@@ -51,6 +51,7 @@ std::vector<Prism> mend(const OccluderIndex& index, std::span<const Displaced> d
     std::ranges::copy(index.solids_on(ground_box(index.box(b))), std::back_inserter(about));
   make_unique(about);
   std::vector<Near> near;
+  near.reserve(about.size());
   for (const std::uint32_t s : about)
     near.push_back({index.solid_box(s), s, false});
   for (const Displaced& d : displaced) {

@@ -58,6 +58,7 @@ std::vector<std::vector<std::size_t>> groups_of(const OccluderIndex& index,
   for (std::size_t k = 0; k < n; ++k)
     groups[root(k)].push_back(k);
   std::vector<std::vector<std::size_t>> out;
+  out.reserve(groups.size());
   for (auto& [_, group] : groups)
     out.push_back(std::move(group));
   return out;
@@ -128,6 +129,7 @@ Mender::Mended Mender::mended(Order order) {
     for (const std::vector<std::size_t>& group : groups_of(*index, order, stop_)) {
       if (stop_) return out;
       std::vector<ObjectId> ids;
+      ids.reserve(group.size());
       for (const std::size_t k : group)
         ids.push_back(order.displaced[k].first);
       auto known = before.groups.extract(ids);

@@ -273,6 +273,7 @@ std::shared_ptr<const OccluderChange> SceneState::change_of(const OccluderIndex&
                                     [](const auto& d) { return d.first; }))
       missing.push_back(box);
   std::vector<Box2> places;
+  places.reserve(missing.size());
   for (const Aabb& b : missing)
     places.push_back(ground_box(b));
   const RectTree tree(places);
