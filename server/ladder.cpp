@@ -79,7 +79,7 @@ bool Ladder::holds(const Reach& reach, const Outlook& wanted, double part) const
 
 Ladder::Choice Ladder::choose(const Outlook& wanted) const {
   const auto last = static_cast<std::uint32_t>(reaches_.size() - 1);
-  if (wanted.about_ || !wanted.ahead_.empty()) {
+  if (!wanted.anywhere()) {
     for (std::uint32_t i = 0; i < reaches_.size(); ++i)
       if (const Method* m = methods_[i]; m != nullptr && holds(reaches_[i], wanted, 1))
         return {i, m, indices_[i], 1};
@@ -88,7 +88,7 @@ Ladder::Choice Ladder::choose(const Outlook& wanted) const {
 }
 
 double Ladder::safe_part(const Reach& reach, const Outlook& wanted) const {
-  if ((!wanted.about_ && wanted.ahead_.empty()) || holds(reach, wanted, 1)) return 1;
+  if (wanted.anywhere() || holds(reach, wanted, 1)) return 1;
   double safe = 0;
   double not_safe = 1;
   for (int i = 0; i < 24; ++i) {

@@ -30,6 +30,7 @@ class Outlook {
 
  private:
   friend class Ladder;
+  bool anywhere() const { return !about_ && ahead_.empty(); }
   std::optional<Reach> about_;
   std::vector<Vec3> ahead_;  ///< seen from the observer; not empty: instead of about_
   Vec3 observer_{0};

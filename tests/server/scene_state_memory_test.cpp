@@ -24,17 +24,29 @@ namespace {
 
 using server::SceneState;
 
-TEST(SceneStateMemory, AnEditIsDoneOrNotOrTheSceneIsTorn) {
-  SceneBuilder b;
+/// Four houses in a row, apart from each other, and what hides things of them.
+class SceneStateMemory : public ::testing::Test {
+ protected:
+  SceneStateMemory() {
+    SceneBuilder b;
+    for (int k = 0; k < 4; ++k)
+      houses.push_back(b.add_box({20, 0, 30.0 * k}, {32, 12, 30.0 * k + 12}));
+    scene = std::move(b).finish();
+    ShrinkOptions options;
+    options.reach = Reach::disc(1);
+    auto shrunk = shrink(scene, options, FastEroder{});
+    EXPECT_TRUE(shrunk);
+    if (shrunk) set = std::move(shrunk->set);
+    index.emplace(set);
+  }
+
   std::vector<ObjectId> houses;
-  for (int k = 0; k < 4; ++k)
-    houses.push_back(b.add_box({20, 0, 30.0 * k}, {32, 12, 30.0 * k + 12}));
-  const Scene scene = std::move(b).finish();
-  ShrinkOptions options;
-  options.reach = Reach::disc(1);
-  const auto shrunk = shrink(scene, options, FastEroder{});
-  ASSERT_TRUE(shrunk);
-  const OccluderIndex index(shrunk->set);
+  Scene scene;
+  OccluderSet set;
+  std::optional<OccluderIndex> index;
+};
+
+TEST_F(SceneStateMemory, AnEditIsDoneOrNotOrTheSceneIsTorn) {
   const std::vector<Edit> edits{{EditKind::kOccluderOff, houses[0], {}, 0},
                                 {EditKind::kRemove, houses[1], {}, 0},
                                 {EditKind::kMove, houses[2], {{5, 0, 5}, {1, 0, 0, 0}}, 0}};
@@ -45,7 +57,7 @@ TEST(SceneStateMemory, AnEditIsDoneOrNotOrTheSceneIsTorn) {
     SceneState state(scene);
     const Edit before{EditKind::kOccluderOff, houses[3], {}, 0};
     ASSERT_NE(state.apply({&before, 1}, {}).epoch, 0U);
-    static_cast<void>(state.amendment(index, {}, {}));  // the rung's counts are there
+    static_cast<void>(state.amendment(*index, {}, {}));  // the rung's counts are there
     bool thrown = false;
     allocations_left = most;
     try {
@@ -71,17 +83,7 @@ TEST(SceneStateMemory, AnEditIsDoneOrNotOrTheSceneIsTorn) {
 }
 
 // A rung is known with all that is displaced, or asked for again.
-TEST(SceneStateMemory, ARungIsMaskedWhollyOrNotYetThere) {
-  SceneBuilder b;
-  std::vector<ObjectId> houses;
-  for (int k = 0; k < 4; ++k)
-    houses.push_back(b.add_box({20, 0, 30.0 * k}, {32, 12, 30.0 * k + 12}));
-  const Scene scene = std::move(b).finish();
-  ShrinkOptions options;
-  options.reach = Reach::disc(1);
-  const auto shrunk = shrink(scene, options, FastEroder{});
-  ASSERT_TRUE(shrunk);
-  const OccluderIndex index(shrunk->set);
+TEST_F(SceneStateMemory, ARungIsMaskedWhollyOrNotYetThere) {
   int thrown = 0;
   bool done = false;
   for (int most = 0; !done; ++most) {
@@ -94,35 +96,26 @@ TEST(SceneStateMemory, ARungIsMaskedWhollyOrNotYetThere) {
     std::shared_ptr<const Amendment> amendment;
     allocations_left = most;
     try {
-      amendment = state.amendment(index, {}, {});
+      amendment = state.amendment(*index, {}, {});
       done = true;
     } catch (const std::bad_alloc&) {
       ++thrown;
     }
     allocations_left = -1;
-    if (!amendment) amendment = state.amendment(index, {}, {});
+    if (!amendment) amendment = state.amendment(*index, {}, {});
     ASSERT_TRUE(amendment->occluders);
-    ASSERT_EQ(amendment->occluders->shrunk_off.size(), shrunk->set.shrunk.size()) << most;
+    ASSERT_EQ(amendment->occluders->shrunk_off.size(), set.shrunk.size()) << most;
     EXPECT_EQ(std::ranges::count(amendment->occluders->shrunk_off, 0), 0) << most;
   }
   EXPECT_GT(thrown, 5);
 }
 
 // Past a session: whose edit tears the scene is told so, and everything is listed from then on.
-TEST(SceneStateMemory, ATornSceneListsEverything) {
-  SceneBuilder b;
-  const ObjectId house = b.add_box({20, 0, -30}, {32, 12, 30});
-  b.add_box({60, 0, -1}, {61, 1, 1}, OccluderTag::kNever);
-  const Scene scene = std::move(b).finish();
-  ShrinkOptions options;
-  options.reach = Reach::disc(1);
-  const auto shrunk = shrink(scene, options, FastEroder{});
-  ASSERT_TRUE(shrunk);
-  const OccluderIndex index(shrunk->set);
-  const auto method = make_method("cull-map", scene, shrunk->set, {});
+TEST_F(SceneStateMemory, ATornSceneListsEverything) {
+  const auto method = make_method("cull-map", scene, set, {});
   ASSERT_TRUE(method);
   const server::ServedScene served = server::served_scene(scene);
-  const server::Ladder ladder(options.reach, **method, shrunk->set.slack_m, &index);
+  const server::Ladder ladder(set.reach, **method, set.slack_m, &*index);
   bool torn = false;
   for (int most = 0; !torn; ++most) {
     ASSERT_LT(most, 1000);
@@ -140,8 +133,8 @@ TEST(SceneStateMemory, ATornSceneListsEverything) {
       return std::get<wire::PvsMessage>(*wire::decode(table.work({})->bytes));
     };
     EXPECT_FALSE(asked().everything);
-    const auto edit = wire::encode(
-        wire::EditMessage{session, 1, {{EditKind::kMove, house, {{1, 0, 0}, {1, 0, 0, 0}}, 0}}});
+    const auto edit = wire::encode(wire::EditMessage{
+        session, 1, {{EditKind::kMove, houses[0], {{1, 0, 0}, {1, 0, 0, 0}}, 0}}});
     std::optional<server::Outgoing> out;
     allocations_left = most;
     try {
